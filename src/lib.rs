@@ -1,0 +1,5 @@
+//! octray: a batch renderer and ray-tracing library for analytic primitives.
+#![forbid(unsafe_code)]
+
+pub mod sample;
+pub mod scene;

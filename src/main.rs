@@ -1,0 +1,3 @@
+//! The command `octray`.
+#![forbid(unsafe_code)]
+fn main() {}

@@ -1,0 +1,131 @@
+//! Sample points: (seed, pixel, sample, dimension) to bits, and nothing but integers.
+//!
+//! Every pair of dimensions is a (0,2)-sequence of its own: the first two dimensions of Sobol's
+//! sequence in an order shuffled by Owen scrambling, each coordinate Owen-scrambled. Nothing is
+//! carried from one call to the next, so samples do not depend on threads, tiles or crops.
+//!
+//! Sources: Burley, "Practical hash-based Owen scrambling", Journal of Computer Graphics Techniques
+//! 9(4), 2020; the hash is Vegdahl's refinement of Laine and Karras's ("Building a better LK hash",
+//! 2021); the Pascal matrix by halving is from Ahmed, "An implementation algorithm of 2D Sobol sequence
+//! fast, elegant, and compact", Eurographics Symposium on Rendering, 2024.
+
+/// What a pair of dimensions is used for: one number each, so that no two uses share a pattern.
+pub mod dimension {
+    /// The point in the pixel.
+    pub const FILTER: u32 = 0;
+    /// The point on the lens.
+    pub const LENS: u32 = 1;
+}
+
+/// Names the sample pattern of one pixel: all its samples and dimensions.
+///
+/// The pixel is counted in the display window, so that crops and shards see the same pattern.
+pub fn pixel_key(seed: u64, x: i32, y: i32) -> u32 {
+    let place = u64::from(x as u32) << 32 | u64::from(y as u32);
+    (mix(mix(seed) ^ place) >> 32) as u32
+}
+
+/// Sample `index` of a pixel in one pair of dimensions, as fractions of 2^32.
+#[inline]
+pub fn pair(pixel_key: u32, index: u32, dimension: u32) -> [u32; 2] {
+    let key = hash(pixel_key ^ hash(dimension.wrapping_add(0x9e37_79b9)));
+    let i = laine_karras(index.reverse_bits(), key).reverse_bits();
+    let x = laine_karras(i, hash(key ^ 0x68bc_21eb)).reverse_bits();
+    let y = laine_karras(pascal(i), hash(key ^ 0x02e5_be93)).reverse_bits();
+    [x, y]
+}
+
+/// Bits as the number they stand for, in the open interval 0..1.
+#[inline]
+pub fn unit(bits: u32) -> f64 {
+    (f64::from(bits) + 0.5) * (1.0 / 4_294_967_296.0)
+}
+
+/// Owen scrambling of bit-reversed digits: every bit is flipped by a hash of those below it.
+#[inline]
+fn laine_karras(mut x: u32, key: u32) -> u32 {
+    x ^= x.wrapping_mul(0x3d20_adea);
+    x = x.wrapping_add(key);
+    x = x.wrapping_mul((key >> 16) | 1);
+    x ^= x.wrapping_mul(0x0552_6c56);
+    x ^ x.wrapping_mul(0x53a2_2864)
+}
+
+/// Sobol's second dimension, bits reversed: the index times Pascal's triangle modulo 2.
+#[inline]
+fn pascal(mut i: u32) -> u32 {
+    i ^= (i >> 16) & 0x0000_ffff;
+    i ^= (i >> 8) & 0x00ff_00ff;
+    i ^= (i >> 4) & 0x0f0f_0f0f;
+    i ^= (i >> 2) & 0x3333_3333;
+    i ^ ((i >> 1) & 0x5555_5555)
+}
+
+/// A 32-bit finaliser (Wellons, "Prospecting for hash functions", 2018).
+#[inline]
+fn hash(mut x: u32) -> u32 {
+    x ^= x >> 16;
+    x = x.wrapping_mul(0x7feb_352d);
+    x ^= x >> 15;
+    x = x.wrapping_mul(0x846c_a68b);
+    x ^ (x >> 16)
+}
+
+/// SplitMix64's finaliser (Steele, Lea and Flood, OOPSLA 2014).
+fn mix(mut x: u64) -> u64 {
+    x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sobol's second dimension by its textbook recurrence (Bratley and Fox, 1988): v_j = v_{j-1} ^ v_{j-1}/2.
+    fn sobol1(index: u32) -> u32 {
+        let mut direction = 1u32 << 31;
+        let mut x = 0;
+        for bit in 0..32 {
+            if index >> bit & 1 == 1 {
+                x ^= direction;
+            }
+            direction ^= direction >> 1;
+        }
+        x
+    }
+
+    #[test]
+    fn pascal_is_sobols_second_dimension() {
+        for i in (0..5000).chain([u32::MAX, 0x8000_0001, 0x1234_5678]) {
+            assert_eq!(pascal(i).reverse_bits(), sobol1(i), "{i}");
+        }
+    }
+
+    /// Of 2^k samples exactly one lies in each elementary interval of area 2^-k.
+    #[test]
+    fn every_power_of_two_is_stratified() {
+        for (pixel, dimension) in [(0, 0), (77, 1), (12_345, 9)] {
+            let key = pixel_key(3, pixel, 5);
+            for k in 0..=8u32 {
+                for columns in 0..=k {
+                    let mut seen = vec![false; 1 << k];
+                    for index in 0..1u32 << k {
+                        let [x, y] = pair(key, index, dimension).map(u64::from);
+                        let cell = (x << columns >> 32) << (k - columns) | (y << (k - columns) >> 32);
+                        assert!(!std::mem::replace(&mut seen[cell as usize], true), "{k} {columns} {index}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn pixels_and_dimensions_are_unlike() {
+        let first = |key, dimension| pair(key, 0, dimension);
+        assert_ne!(first(pixel_key(0, 0, 0), 0), first(pixel_key(0, 1, 0), 0));
+        assert_ne!(first(pixel_key(0, 0, 0), 0), first(pixel_key(1, 0, 0), 0));
+        assert_ne!(first(pixel_key(0, 0, 0), 0), first(pixel_key(0, 0, 0), 1));
+    }
+}

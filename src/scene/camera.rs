@@ -1,0 +1,45 @@
+//! Cameras: where the picture is taken from.
+
+use glam::DVec3;
+
+/// A camera looks from `eye` to `target`. Its view axis is `forward = unit(target - eye)`, its image
+/// axes are `right = unit(forward x up)` and `true_up = right x forward`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Camera {
+    /// What `--camera` calls it; `None` for a lone `[camera]`.
+    pub name: Option<String>,
+    /// World coordinates.
+    pub eye: DVec3,
+    /// World coordinates, differs from `eye`.
+    pub target: DVec3,
+    /// Not parallel to the view.
+    pub up: DVec3,
+    /// How a point of the picture becomes a ray.
+    pub lens: Lens,
+}
+
+/// With (x, y) a point of the picture in pixels (x right, y down, the outer corner of the first pixel
+/// at 0, 0), W x H its size, sx = (2x - W)/H and sy = (H - 2y)/H:
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Lens {
+    /// origin `eye`, direction `forward + tan(vfov/2) (sx right + sy true_up)`.
+    /// The angle, in degrees, spans the outer edges of the top and bottom pixels.
+    Pinhole {
+        /// Degrees, 0 < vfov < 180.
+        vfov: f64,
+    },
+    /// origin `eye + height/2 (sx right + sy true_up)`, direction `forward`.
+    Orthographic {
+        /// Scene units from the lower to the upper edge of the picture, > 0.
+        height: f64,
+    },
+}
+
+impl Camera {
+    /// `(right, true_up, forward)`, each of unit length.
+    pub fn axes(&self) -> (DVec3, DVec3, DVec3) {
+        let forward = (self.target - self.eye).normalize();
+        let right = forward.cross(self.up).normalize();
+        (right, right.cross(forward), forward)
+    }
+}

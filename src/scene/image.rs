@@ -1,0 +1,146 @@
+//! The picture: size, samples, filter, integrator.
+
+/// Size and sampling of the picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImageSettings {
+    /// Pixels, 1 to 65,536.
+    pub width: u32,
+    /// Pixels, 1 to 65,536; width x height at most 2^30.
+    pub height: u32,
+    /// Samples per pixel, >= 1. One sample sits at the pixel's centre.
+    pub spp: u32,
+    /// Pixel filter.
+    pub filter: Filter,
+}
+
+/// What is computed, and how far.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RenderSettings {
+    /// How radiance is found.
+    pub integrator: Integrator,
+    /// Longest chain of rays, the camera ray being 1.
+    pub max_depth: u32,
+    /// Chooses the sample pattern.
+    pub seed: u64,
+}
+
+impl Default for RenderSettings {
+    fn default() -> Self {
+        RenderSettings { integrator: Integrator::Direct, max_depth: 5, seed: 0 }
+    }
+}
+
+/// How radiance is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Integrator {
+    /// Direct light with mirror reflection and refraction (Whitted).
+    Direct,
+}
+
+/// A separable pixel filter, zero beyond its radius.
+///
+/// Samples are drawn from the filter itself and weigh the same, so that a sample belongs to one pixel
+/// alone: Ernst, Stamminger and Greiner, "Filter importance sampling", IEEE Symposium on Interactive
+/// Ray Tracing, 2006.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Filter {
+    /// Its shape.
+    pub kind: FilterKind,
+    /// Half its width in pixels, > 0.
+    pub radius: f64,
+}
+
+/// The shape of a pixel filter over `x` in `-radius..radius`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FilterKind {
+    /// The same weight everywhere.
+    Box,
+    /// `exp(-x^2/2s^2) - exp(-radius^2/2s^2)` with `s = radius/3`.
+    Gaussian,
+    /// The four-term window: Harris, "On the use of windows for harmonic analysis", Proceedings of the
+    /// IEEE 66(1), 1978.
+    BlackmanHarris,
+}
+
+impl Default for Filter {
+    fn default() -> Self {
+        Filter { kind: FilterKind::Gaussian, radius: 1.5 }
+    }
+}
+
+impl FilterKind {
+    /// The weight at `x` radii from the centre, for `|x| <= 1`; the scale is free.
+    pub fn weight(self, x: f64) -> f64 {
+        use std::f64::consts::PI;
+        match self {
+            FilterKind::Box => 1.0,
+            FilterKind::Gaussian => (-4.5 * x * x).exp() - (-4.5f64).exp(),
+            FilterKind::BlackmanHarris => {
+                let turn = PI * (x + 1.0);
+                0.35875 - 0.48829 * turn.cos() + 0.14128 * (2.0 * turn).cos() - 0.01168 * (3.0 * turn).cos()
+            }
+        }
+    }
+}
+
+/// Where in a filter a sample falls: the inverse of the filter's integral along one axis.
+#[derive(Debug, Clone)]
+pub struct FilterTable {
+    /// Offsets in pixels at evenly spaced fractions 0, 1/STEPS, ... 1 of the integral.
+    offsets: Vec<f64>,
+}
+
+impl FilterTable {
+    const STEPS: usize = 1024;
+
+    /// Inverts the integral of a filter: trapezoids on 16 points a step, then linear between them.
+    pub fn new(filter: Filter) -> Self {
+        let points = 16 * Self::STEPS;
+        let place = |k: usize| 2.0 * k as f64 / points as f64 - 1.0;
+        let mut sums = vec![0.0];
+        for k in 0..points {
+            let area = filter.kind.weight(place(k)) + filter.kind.weight(place(k + 1));
+            sums.push(sums[k] + area);
+        }
+        let mut k = 0;
+        let offsets = (0..=Self::STEPS).map(|step| {
+            let goal = sums[points] * step as f64 / Self::STEPS as f64;
+            while k + 1 < points && sums[k + 1] < goal {
+                k += 1;
+            }
+            let part = ((goal - sums[k]) / (sums[k + 1] - sums[k])).clamp(0.0, 1.0);
+            filter.radius * (place(k) + part * (place(k + 1) - place(k)))
+        });
+        FilterTable { offsets: offsets.collect() }
+    }
+
+    /// The offset from the pixel's centre, in pixels, for `u` in 0..1.
+    #[inline]
+    pub fn offset(&self, u: f64) -> f64 {
+        let x = u * Self::STEPS as f64;
+        let step = (x as usize).min(Self::STEPS - 1);
+        let (a, b) = (self.offsets[step], self.offsets[step + 1]);
+        a + (x - step as f64) * (b - a)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn offsets_follow_the_filter() {
+        for kind in [FilterKind::Box, FilterKind::Gaussian, FilterKind::BlackmanHarris] {
+            let table = FilterTable::new(Filter { kind, radius: 1.5 });
+            assert!((table.offset(0.5)).abs() < 1e-9 && (table.offset(0.0) + 1.5).abs() < 1e-2, "{kind:?}");
+            let variance = (0..100_000).map(|i| table.offset((i as f64 + 0.5) / 1e5).powi(2)).sum::<f64>() / 1e5;
+            let (mut moment, mut area) = (0.0, 0.0);
+            for i in 0..100_000 {
+                let x = (i as f64 + 0.5) / 5e4 - 1.0;
+                (moment, area) = (moment + x * x * 2.25 * kind.weight(x), area + kind.weight(x));
+            }
+            // The outermost of 1,024 steps are the longest: straight lines there widen the filter by 1e-3.
+            assert!((variance - moment / area).abs() < 5e-4, "{kind:?}: {variance} {}", moment / area);
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! What the user wrote: every quantity in f64, every thing by name or index, in world coordinates.
+//!
+//! This room answers for the data of a scene, for reading it ([`toml`], [`nff`], [`cloud`]) and for
+//! the rules that a valid scene keeps. It leaves to others what a render makes of it: both tracers,
+//! the packet engine and the reference, start from the same [`Scene`] and share nothing else but
+//! the sampler. Group transforms are applied when a scene is read, so all geometry here is in world
+//! coordinates. What each part means for the picture is said beside its type, once, for both.
+
+mod background;
+mod camera;
+mod cloud;
+mod image;
+mod light;
+mod material;
+mod shape;
+mod texture;
+
+use std::borrow::Cow;
+
+use glam::DVec3;
+
+pub use self::background::{Backdrop, Background};
+pub use self::camera::{Camera, Lens};
+pub use self::cloud::{Cloud, CloudMaterial, CloudShapes, Rows};
+pub use self::image::{Filter, FilterKind, FilterTable, ImageSettings, Integrator, RenderSettings};
+pub use self::light::{Falloff, Light, Source};
+pub use self::material::{Material, Model, Paint, Visible};
+pub use self::shape::{Cone, Cuboid, Cylinder, Disk, Plane, Polygon, Shape, Sphere, basis};
+pub use self::texture::{Checker, ColorSpace, ImageTexture, Texel, Texture, TextureFilter, TextureKind, Wrap};
+
+/// A whole scene: geometry, materials, lights, cameras and the settings of its picture.
+///
+/// A value made by a reader keeps all rules of the format; one made by hand is checked by
+/// the plan before anything is traced.
+#[derive(Debug, Clone, Default)]
+pub struct Scene {
+    /// Size, samples and filter of the picture; absent where a scene is only queried.
+    pub image: Option<ImageSettings>,
+    /// Integrator, depth and seed.
+    pub render: RenderSettings,
+    /// All cameras in file order; the first is the default one. May be empty.
+    pub cameras: Vec<Camera>,
+    /// What a ray sees that meets nothing.
+    pub background: Background,
+    /// Ambient light, linear Rec. 709: each hit adds (its material's diffuse albedo) x this.
+    pub ambient: DVec3,
+    /// Textures, by the index that [`Paint::Texture`] holds.
+    pub textures: Vec<Texture>,
+    /// Materials in order of appearance: the material index of hits and of AOVs.
+    pub materials: Vec<Material>,
+    /// Lights in file order.
+    pub lights: Vec<Light>,
+    /// Single shapes in file order: primitives `0..objects.len()`.
+    pub objects: Vec<Object>,
+    /// Clouds in file order; their rows follow the objects in the numbering of primitives.
+    pub clouds: Vec<Cloud>,
+    /// Names of the groups; an object or cloud refers to one by index.
+    pub groups: Vec<String>,
+}
+
+/// One shape with its material: a primitive of its own.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Object {
+    /// Geometry, world coordinates.
+    pub shape: Shape,
+    /// Index into [`Scene::materials`].
+    pub material: usize,
+    /// What the user called it; `None` reads as "sphere 17", kind and primitive index.
+    pub name: Option<String>,
+    /// Index into [`Scene::groups`].
+    pub group: Option<usize>,
+}
+
+/// One primitive of a scene, whichever way it was written.
+#[derive(Debug, Clone)]
+pub struct Primitive<'a> {
+    /// Geometry, world coordinates, f64; made on the fly for rows of a cloud.
+    pub shape: Cow<'a, Shape>,
+    /// Index into [`Scene::materials`].
+    pub material: usize,
+    /// Factor on the material's colour (white but in clouds with `colors`).
+    pub color: DVec3,
+}
+
+impl Scene {
+    /// How many primitives the scene has: objects, then the rows of each cloud.
+    pub fn primitive_count(&self) -> usize {
+        self.objects.len() + self.clouds.iter().map(Cloud::len).sum::<usize>()
+    }
+
+    /// The primitive of an index, or `None` past the last one.
+    pub fn primitive(&self, index: usize) -> Option<Primitive<'_>> {
+        if let Some(object) = self.objects.get(index) {
+            return Some(object.primitive());
+        }
+        let mut row = index - self.objects.len();
+        for cloud in &self.clouds {
+            if row < cloud.len() {
+                return Some(cloud.primitive(row));
+            }
+            row -= cloud.len();
+        }
+        None
+    }
+
+    /// All primitives in the order of their indices.
+    pub fn primitives(&self) -> impl Iterator<Item = Primitive<'_>> {
+        let objects = self.objects.iter().map(Object::primitive);
+        let rows = self.clouds.iter().flat_map(|cloud| (0..cloud.len()).map(move |row| cloud.primitive(row)));
+        objects.chain(rows)
+    }
+
+    /// The name of a primitive: the user's, the cloud's, or its kind and index ("sphere 17").
+    pub fn primitive_name(&self, index: usize) -> Option<String> {
+        let primitive = self.primitive(index)?;
+        let given = match self.objects.get(index) {
+            Some(object) => object.name.clone(),
+            None => self.cloud_of(index).and_then(|cloud| cloud.name.clone()),
+        };
+        Some(given.unwrap_or_else(|| format!("{} {index}", primitive.shape.kind())))
+    }
+
+    /// The camera of a name, or the first one where no name is given.
+    pub fn camera(&self, name: Option<&str>) -> Option<&Camera> {
+        match name {
+            None => self.cameras.first(),
+            Some(name) => self.cameras.iter().find(|camera| camera.name.as_deref() == Some(name)),
+        }
+    }
+
+    fn cloud_of(&self, index: usize) -> Option<&Cloud> {
+        let mut row = index.checked_sub(self.objects.len())?;
+        self.clouds.iter().find(|cloud| {
+            let inside = row < cloud.len();
+            row = row.wrapping_sub(cloud.len());
+            inside
+        })
+    }
+}
+
+impl Object {
+    fn primitive(&self) -> Primitive<'_> {
+        Primitive { shape: Cow::Borrowed(&self.shape), material: self.material, color: DVec3::ONE }
+    }
+}
