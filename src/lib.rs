@@ -1,5 +1,19 @@
 //! octray: a batch renderer and ray-tracing library for analytic primitives.
 #![forbid(unsafe_code)]
 
+pub mod accel;
+pub mod lanes;
+pub mod plan;
+pub mod render;
 pub mod sample;
 pub mod scene;
+pub mod shade;
+pub mod shapes;
+mod tracer;
+
+pub use lanes::Ray;
+pub use render::{Progress, Renderer, Rendering};
+pub use scene::Scene;
+pub use tracer::{Hit, Tracer};
+pub mod film;
+pub mod integrate;

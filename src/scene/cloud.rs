@@ -102,8 +102,12 @@ impl Cloud {
             CloudMaterial::One(material) => *material,
             CloudMaterial::Each(materials) => materials[i] as usize,
         };
-        let color = self.colors.as_ref().map_or(DVec3::ONE, |colors| DVec3::from_array(colors[i].map(f64::from)));
-        Primitive { shape: Cow::Owned(self.shape(i)), material, color }
+        Primitive { shape: Cow::Owned(self.shape(i)), material, color: self.color(i) }
+    }
+
+    /// Factor on the colour of row `i`'s material.
+    pub fn color(&self, i: usize) -> DVec3 {
+        self.colors.as_ref().map_or(DVec3::ONE, |colors| DVec3::from_array(colors[i].map(f64::from)))
     }
 
     fn shape(&self, i: usize) -> Shape {

@@ -120,6 +120,18 @@ impl Scene {
         Some(given.unwrap_or_else(|| format!("{} {index}", primitive.shape.kind())))
     }
 
+    /// Factor on the colour of a primitive's material: white but in clouds with `colors`.
+    pub fn color_factor(&self, index: usize) -> DVec3 {
+        let Some(mut row) = index.checked_sub(self.objects.len()) else { return DVec3::ONE };
+        for cloud in &self.clouds {
+            if row < cloud.len() {
+                return cloud.color(row);
+            }
+            row -= cloud.len();
+        }
+        DVec3::ONE
+    }
+
     /// The camera of a name, or the first one where no name is given.
     pub fn camera(&self, name: Option<&str>) -> Option<&Camera> {
         match name {

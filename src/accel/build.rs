@@ -1,0 +1,231 @@
+//! Builds the tree: a binary one by PLOC with reinsertion, leaves of one kind by the surface area
+//! heuristic, then eight children a node, and the parts in the order of their leaves.
+
+use glam::{DVec3, Vec3, Vec3A};
+use obvhs::Boundable;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
+use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
+
+use super::Tree;
+use super::node::{Child, Node};
+use crate::lanes::LANES;
+use crate::plan::{Kind, Parts};
+use crate::scene::Visible;
+use crate::shapes::{Boxes, Cones, Cylinders, Disks, Polygons, Spheres, Store, Stores, TurnedBoxes};
+
+/// Most rows of a leaf.
+const MOST_ROWS: u32 = 8;
+/// Cost of a box test where that of a primitive is 1, for the surface area heuristic.
+const BOX_COST: f32 = 1.0;
+
+/// A part with bounds, and its bounds.
+struct Item {
+    kind: Kind,
+    index: u32,
+    aabb: Aabb,
+}
+
+impl Boundable for Item {
+    fn aabb(&self) -> Aabb {
+        self.aabb
+    }
+}
+
+impl Tree {
+    /// Takes the parts; `visible` tells by material which sides are seen.
+    pub fn new(mut parts: Parts, visible: &[Visible]) -> Self {
+        let items = items(&parts);
+        let mut nodes = Vec::new();
+        let mut size = 0.0;
+        if !items.is_empty() {
+            let binary = build_binary(&items);
+            let bounds = binary.nodes[0].aabb();
+            size = (bounds.max - bounds.min).max_element();
+            let mut wide = Widen::new(&binary, &items);
+            wide.build();
+            nodes = wide.nodes;
+            parts = reorder(parts, &wide.order);
+        }
+        let stores = Stores::new(parts, visible);
+        let culls = stores.hide_any();
+        Tree { stores, nodes, culls, size, one_by_one: false }
+    }
+}
+
+fn items(parts: &Parts) -> Vec<Item> {
+    let mut items = Vec::new();
+    add::<Spheres>(&mut items, Kind::Sphere, &parts.spheres);
+    add::<Disks>(&mut items, Kind::Disk, &parts.disks);
+    add::<Polygons<3>>(&mut items, Kind::Triangle, &parts.triangles);
+    add::<Polygons<4>>(&mut items, Kind::Quad, &parts.quads);
+    add::<Polygons<8>>(&mut items, Kind::Octagon, &parts.octagons);
+    add::<Boxes>(&mut items, Kind::Box, &parts.boxes);
+    add::<TurnedBoxes>(&mut items, Kind::TurnedBox, &parts.turned_boxes);
+    add::<Cylinders>(&mut items, Kind::Cylinder, &parts.cylinders);
+    add::<Cones>(&mut items, Kind::Cone, &parts.cones);
+    items
+}
+
+fn add<S: Store>(items: &mut Vec<Item>, kind: Kind, parts: &[S::Part]) {
+    let item = |(index, part)| {
+        let (min, max) = S::bounds(part);
+        Item { kind, index: index as u32, aabb: outward(min, max) }
+    };
+    items.extend(parts.iter().enumerate().map(item));
+}
+
+/// Bounds in f32 that hold the exact part and the rounded one: 4 roundings of the larger coordinate out.
+fn outward(min: DVec3, max: DVec3) -> Aabb {
+    let pad = min.abs().max(max.abs()) * f64::from(2.0 * f32::EPSILON);
+    let (min, max) = ((min - pad).as_vec3(), (max + pad).as_vec3());
+    let down = Vec3::new(min.x.next_down(), min.y.next_down(), min.z.next_down());
+    let up = Vec3::new(max.x.next_up(), max.y.next_up(), max.z.next_up());
+    Aabb::new(Vec3A::from(down), Vec3A::from(up))
+}
+
+/// Sources: Meister and Bittner, "Parallel locally-ordered clustering for bounding volume hierarchy
+/// construction", IEEE TVCG 24(3), 2018, and "Parallel reinsertion for bounding volume hierarchy
+/// optimization", Computer Graphics Forum 37(2), 2018.
+fn build_binary(items: &[Item]) -> Bvh2 {
+    let indices = (0..items.len() as u32).collect();
+    let mut builder = PlocBuilder::with_capacity(items.len());
+    let mut binary = builder.build(PlocSearchDistance::Medium, items, indices, SortPrecision::U64, 3);
+    ReinsertionOptimizer::default().run(&mut binary, 0.05, None);
+    binary
+}
+
+/// From the binary tree to the wide one.
+struct Widen<'a> {
+    binary: &'a Bvh2,
+    items: &'a [Item],
+    /// By binary node: items below it, or 0 where they are of several kinds or too many for a leaf.
+    leaf: Vec<u32>,
+    nodes: Vec<Node>,
+    /// By kind: parts in the order of their rows.
+    order: Vec<Vec<u32>>,
+}
+
+impl<'a> Widen<'a> {
+    fn new(binary: &'a Bvh2, items: &'a [Item]) -> Self {
+        let leaf = choose_leaves(binary, items);
+        Widen { binary, items, leaf, nodes: Vec::new(), order: vec![Vec::new(); Kind::ALL.len()] }
+    }
+
+    /// Fills the nodes level by level from the root.
+    fn build(&mut self) {
+        self.nodes.push(Node::empty());
+        let mut waiting = vec![(0, 0)];
+        while let Some((wide, binary)) = waiting.pop() {
+            for (slot, child) in self.eight_below(binary).into_iter().enumerate() {
+                let aabb = *self.binary.nodes[child as usize].aabb();
+                let content = if self.leaf[child as usize] > 0 {
+                    self.add_leaf(child)
+                } else {
+                    self.nodes.push(Node::empty());
+                    waiting.push((self.nodes.len() - 1, child));
+                    Child::Node(self.nodes.len() - 1)
+                };
+                self.nodes[wide].set(slot, aabb.min.into(), aabb.max.into(), content);
+            }
+        }
+    }
+
+    /// Opens the largest node again and again until there are eight children.
+    fn eight_below(&self, root: u32) -> Vec<u32> {
+        let mut open = vec![root];
+        while open.len() < LANES {
+            let area = |child: &u32| self.binary.nodes[*child as usize].aabb().half_area();
+            let inner = (0..open.len()).filter(|i| self.leaf[open[*i] as usize] == 0);
+            let Some(largest) = inner.max_by(|a, b| area(&open[*a]).total_cmp(&area(&open[*b]))) else { break };
+            let first = self.binary.nodes[open[largest] as usize].first_index;
+            open[largest] = first;
+            open.push(first + 1);
+        }
+        open
+    }
+
+    fn add_leaf(&mut self, root: u32) -> Child {
+        let mut below = vec![root];
+        let mut rows: Vec<&Item> = Vec::new();
+        while let Some(index) = below.pop() {
+            let node = &self.binary.nodes[index as usize];
+            match node.prim_count {
+                0 => below.extend([node.first_index, node.first_index + 1]),
+                count => {
+                    let range = node.first_index as usize..(node.first_index + count) as usize;
+                    rows.extend(self.binary.primitive_indices[range].iter().map(|i| &self.items[*i as usize]));
+                }
+            }
+        }
+        let kind = rows[0].kind;
+        let order = &mut self.order[kind as usize];
+        let first = order.len();
+        order.extend(rows.iter().map(|item| item.index));
+        Child::Leaf { kind, first, count: rows.len() }
+    }
+}
+
+/// By binary node: how many rows a leaf there would have, or 0 where there is to be no leaf.
+fn choose_leaves(binary: &Bvh2, items: &[Item]) -> Vec<u32> {
+    let mut preorder = vec![0u32];
+    let mut next = 0;
+    while next < preorder.len() {
+        let node = &binary.nodes[preorder[next] as usize];
+        if node.prim_count == 0 {
+            preorder.extend([node.first_index, node.first_index + 1]);
+        }
+        next += 1;
+    }
+    let mut below = vec![Below::default(); binary.nodes.len()];
+    let mut leaf = vec![0; binary.nodes.len()];
+    for index in preorder.into_iter().rev().map(|index| index as usize) {
+        let node = &binary.nodes[index];
+        let area = node.aabb().half_area();
+        if node.prim_count > 0 {
+            let kind = Some(items[binary.primitive_indices[node.first_index as usize] as usize].kind);
+            below[index] = Below { count: node.prim_count, kind, cost: area * node.prim_count as f32 };
+            leaf[index] = node.prim_count;
+            continue;
+        }
+        let children = node.first_index as usize;
+        let (a, b) = (below[children], below[children + 1]);
+        let split = a.cost + b.cost + BOX_COST * area;
+        let kind = a.kind.filter(|_| a.kind == b.kind);
+        let count = a.count.saturating_add(b.count);
+        let whole = area * count as f32;
+        let fits = kind.is_some() && count <= MOST_ROWS && whole <= split;
+        let kind = kind.filter(|_| fits);
+        below[index] = Below { count, kind, cost: if fits { whole } else { split } };
+        leaf[index] = if fits { count } else { 0 };
+    }
+    leaf
+}
+
+/// What lies below a binary node.
+#[derive(Debug, Clone, Copy, Default)]
+struct Below {
+    count: u32,
+    /// The one kind of it, where it may be a leaf.
+    kind: Option<Kind>,
+    cost: f32,
+}
+
+fn reorder(parts: Parts, order: &[Vec<u32>]) -> Parts {
+    fn pick<P: Clone>(parts: Vec<P>, order: &[Vec<u32>], kind: Kind) -> Vec<P> {
+        order[kind as usize].iter().map(|i| parts[*i as usize].clone()).collect()
+    }
+    Parts {
+        spheres: pick(parts.spheres, order, Kind::Sphere),
+        planes: parts.planes,
+        disks: pick(parts.disks, order, Kind::Disk),
+        triangles: pick(parts.triangles, order, Kind::Triangle),
+        quads: pick(parts.quads, order, Kind::Quad),
+        octagons: pick(parts.octagons, order, Kind::Octagon),
+        boxes: pick(parts.boxes, order, Kind::Box),
+        turned_boxes: pick(parts.turned_boxes, order, Kind::TurnedBox),
+        cylinders: pick(parts.cylinders, order, Kind::Cylinder),
+        cones: pick(parts.cones, order, Kind::Cone),
+    }
+}

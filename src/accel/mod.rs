@@ -1,0 +1,92 @@
+//! The tree and the ways down it.
+//!
+//! One 8-wide tree serves two kinds of walk. Coherent rays go down as a tile of eight packets, first
+//! all of them against eight boxes, then a lane a packet; in a leaf a lane is a ray. Incoherent rays go
+//! one by one, a lane a box, and in a leaf a lane is a primitive.
+
+mod build;
+mod leaf;
+mod node;
+mod single;
+mod tile;
+
+pub use self::tile::{PACKETS, Tile};
+
+use self::node::Node;
+use crate::lanes::Ray;
+use crate::plan::Kind;
+use crate::shapes::{RowRef, Stores};
+
+/// All primitives of a render, ready to be met.
+#[derive(Debug)]
+pub struct Tree {
+    stores: Stores,
+    nodes: Vec<Node>, // the root first; empty where nothing has bounds
+    culls: bool,      // some row hides a side
+    size: f32,        // longest edge of the bounds, scene units
+    one_by_one: bool, // no tiles
+}
+
+/// Work done, and room for it: one a thread.
+#[derive(Debug, Default)]
+pub struct Walk {
+    /// What was done so far.
+    pub counts: Counts,
+    stack: Vec<tile::Entry>,
+    short: Vec<single::Entry>,
+}
+
+/// Tests done, in pairs of a ray or packet and a box or primitive.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+pub struct Counts {
+    /// Boxes of tree nodes.
+    pub boxes: u64,
+    /// (Ray, primitive) pairs by [`Kind`].
+    pub kinds: [u64; Kind::ALL.len()],
+    /// Pairs decided again in f64.
+    pub redecided: u64,
+}
+
+impl Counts {
+    /// Sums up.
+    pub fn add(&mut self, other: &Counts) {
+        self.boxes += other.boxes;
+        self.redecided += other.redecided;
+        for (sum, count) in self.kinds.iter_mut().zip(other.kinds) {
+            *sum += count;
+        }
+    }
+}
+
+impl Tree {
+    /// With `true`, tiles are taken apart and their rays go one by one: the same bits, more slowly.
+    pub fn one_by_one(self, one_by_one: bool) -> Self {
+        Tree { one_by_one, ..self }
+    }
+
+    /// The stores, for what is to be known of a row that was met.
+    pub fn stores(&self) -> &Stores {
+        &self.stores
+    }
+
+    /// Memory of the nodes in bytes.
+    pub fn bytes(&self) -> usize {
+        self.nodes.capacity() * size_of::<Node>()
+    }
+
+    /// What one ray meets first, and where.
+    pub fn closest(&self, ray: &Ray, walk: &mut Walk) -> (f32, RowRef) {
+        if !ray.is_valid() {
+            return (ray.t_max, RowRef::MISS);
+        }
+        match self.culls {
+            true => self.walk_single::<false, true>(ray, walk),
+            false => self.walk_single::<false, false>(ray, walk),
+        }
+    }
+
+    /// Whether one ray meets anything, either side of it.
+    pub fn occluded(&self, ray: &Ray, walk: &mut Walk) -> bool {
+        ray.is_valid() && self.walk_single::<true, false>(ray, walk).1 != RowRef::MISS
+    }
+}

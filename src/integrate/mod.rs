@@ -1,0 +1,10 @@
+//! From rays to radiance, a tile at a time.
+
+mod camera;
+mod direct;
+mod record;
+mod wave;
+
+pub use self::camera::CameraRays;
+pub use self::direct::{Direct, Room, Samples};
+pub use self::record::{RayCounts, RayKind, Record, Silent};

@@ -1,0 +1,106 @@
+//! Yes or no, eight times.
+
+use std::ops::{BitAnd, BitAndAssign, BitOr, BitOrAssign, Not};
+
+use super::{Float8, LANES};
+
+/// Eight yes-or-no lanes. A comparison with NaN is no.
+#[derive(Debug, Clone, Copy)]
+pub struct Mask8(Float8);
+
+impl Mask8 {
+    /// All lanes no.
+    pub const NONE: Mask8 = Mask8(Float8::new([0.0; LANES]));
+
+    /// Lane `i` is bit `i`.
+    pub fn from_bits(bits: u32) -> Self {
+        let lane = |i| if bits >> i & 1 == 1 { f32::from_bits(u32::MAX) } else { 0.0 };
+        Mask8(Float8::new(std::array::from_fn(lane)))
+    }
+
+    /// Bit `i` is lane `i`.
+    #[inline(always)]
+    pub fn bits(self) -> u32 {
+        self.0.to_bitmask()
+    }
+
+    /// Whether any lane is yes.
+    #[inline(always)]
+    pub fn any(self) -> bool {
+        self.0.to_bitmask() != 0
+    }
+
+    /// Per lane `yes` or `no`, bit for bit.
+    #[inline(always)]
+    pub fn select(self, yes: Float8, no: Float8) -> Float8 {
+        self.0.select(yes, no)
+    }
+
+    /// `a < b`.
+    #[inline(always)]
+    pub fn lt(a: Float8, b: Float8) -> Self {
+        Mask8(a.simd_lt(b))
+    }
+
+    /// `a <= b`.
+    #[inline(always)]
+    pub fn le(a: Float8, b: Float8) -> Self {
+        Mask8(a.simd_le(b))
+    }
+
+    /// `a > b`.
+    #[inline(always)]
+    pub fn gt(a: Float8, b: Float8) -> Self {
+        Mask8(a.simd_gt(b))
+    }
+
+    /// `a >= b`.
+    #[inline(always)]
+    pub fn ge(a: Float8, b: Float8) -> Self {
+        Mask8(a.simd_ge(b))
+    }
+
+    /// Lanes whose sign bit is set, -0 and negative NaN among them.
+    #[inline(always)]
+    pub fn sign(a: Float8) -> Self {
+        Mask8(a)
+    }
+}
+
+impl BitAnd for Mask8 {
+    type Output = Mask8;
+    #[inline(always)]
+    fn bitand(self, other: Mask8) -> Mask8 {
+        Mask8(self.0 & other.0)
+    }
+}
+
+impl BitOr for Mask8 {
+    type Output = Mask8;
+    #[inline(always)]
+    fn bitor(self, other: Mask8) -> Mask8 {
+        Mask8(self.0 | other.0)
+    }
+}
+
+impl BitAndAssign for Mask8 {
+    #[inline(always)]
+    fn bitand_assign(&mut self, other: Mask8) {
+        *self = *self & other;
+    }
+}
+
+impl BitOrAssign for Mask8 {
+    #[inline(always)]
+    fn bitor_assign(&mut self, other: Mask8) {
+        *self = *self | other;
+    }
+}
+
+impl Not for Mask8 {
+    type Output = Mask8;
+    #[inline(always)]
+    fn not(self) -> Mask8 {
+        Mask8(!self.0)
+    }
+}

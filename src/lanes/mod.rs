@@ -1,0 +1,24 @@
+//! Eight of everything: floats, masks, vectors, columns, rays and hits.
+//!
+//! This room is the only one that names the SIMD crate. A lane is one of eight slots; what it stands
+//! for (a ray, a primitive, a packet) is the business of whoever filled it.
+
+mod column;
+mod float;
+mod mask;
+mod packet;
+mod ray;
+mod vec3;
+
+pub use column::{Column, Column3};
+pub use float::{Float8, difference_of_products, float8, square_sum_minus};
+pub use mask::Mask8;
+pub use packet::{Hit8, RayPacket};
+pub use ray::Ray;
+pub use vec3::Vec3x8;
+
+/// Slots of a packet.
+pub const LANES: usize = 8;
+
+/// Half the distance from 1 to the next f32: the relative error of one rounding.
+pub const UNIT_ROUNDOFF: f32 = f32::EPSILON / 2.0;

@@ -1,0 +1,91 @@
+//! Eight rays, eight hits.
+
+use super::{Float8, LANES, Mask8, Ray, Vec3x8, float8};
+
+/// Eight rays. A dead lane has an empty interval, `t_min = +inf` and `t_max = -inf`, which accepts
+/// nothing, so kernels carry no extra mask.
+#[derive(Debug, Clone, Copy)]
+pub struct RayPacket {
+    /// Scene units, camera-relative.
+    pub origin: Vec3x8,
+    /// Any length.
+    pub dir: Vec3x8,
+    /// Open ends.
+    pub t_min: Float8,
+    /// Closed ends.
+    pub t_max: Float8,
+    /// `1 / (dir . dir)`.
+    pub inv_dd: Float8,
+}
+
+impl RayPacket {
+    /// Eight rays that are known to be valid; the lanes of `live` take part.
+    #[inline(always)]
+    pub fn new(origin: Vec3x8, dir: Vec3x8, t_max: Float8, live: Mask8) -> Self {
+        let inv_dd = float8(1.0) / dir.dot(dir);
+        let t_min = live.select(float8(0.0), float8(f32::INFINITY));
+        let t_max = live.select(t_max, float8(f32::NEG_INFINITY));
+        RayPacket { origin, dir, t_min, t_max, inv_dd }
+    }
+
+    /// Up to eight rays; what is missing or invalid is dead.
+    pub fn gather(rays: &[Ray]) -> Self {
+        let dead = Ray { origin: [0.0; 3], t_min: f32::INFINITY, dir: [1.0; 3], t_max: f32::NEG_INFINITY };
+        let ray = |i: usize| *rays.get(i).filter(|ray| ray.is_valid()).unwrap_or(&dead);
+        let rays: [Ray; LANES] = std::array::from_fn(ray);
+        let dir = Vec3x8::from_fn(|i| rays[i].dir);
+        RayPacket {
+            origin: Vec3x8::from_fn(|i| rays[i].origin),
+            dir,
+            t_min: Float8::from(rays.map(|ray| ray.t_min)),
+            t_max: Float8::from(rays.map(|ray| ray.t_max)),
+            inv_dd: float8(1.0) / dir.dot(dir),
+        }
+    }
+
+    /// One ray in all lanes.
+    pub fn splat(ray: &Ray) -> Self {
+        RayPacket::gather(&[*ray; LANES])
+    }
+
+    /// The ray of one lane.
+    pub fn lane(&self, i: usize) -> Ray {
+        let (t_min, t_max) = (self.t_min.to_array()[i], self.t_max.to_array()[i]);
+        Ray { origin: self.origin.lane(i), t_min, dir: self.dir.lane(i), t_max }
+    }
+
+    /// Lanes in which a hit at `t` lies on the ray.
+    #[inline(always)]
+    pub fn accepts(&self, t: Float8) -> Mask8 {
+        Mask8::gt(t, self.t_min) & Mask8::le(t, self.t_max)
+    }
+
+    /// Lanes that take part.
+    pub fn live(&self) -> Mask8 {
+        Mask8::lt(self.t_min, self.t_max)
+    }
+}
+
+/// What eight (ray, primitive) pairs came to.
+#[derive(Debug, Clone, Copy)]
+pub struct Hit8 {
+    /// Place of the hit on its ray; means nothing in missed lanes.
+    pub t: Float8,
+    /// Lanes that hit, as far as f32 can tell.
+    pub mask: Mask8,
+    /// Lanes too close to call: hit or miss is to be decided in f64. They may or may not be in `mask`.
+    pub doubt: Mask8,
+}
+
+impl Hit8 {
+    /// No lane hits and none is in doubt.
+    pub fn none() -> Self {
+        Hit8 { t: Float8::ZERO, mask: Mask8::NONE, doubt: Mask8::NONE }
+    }
+
+    /// The `t` of one lane, if it hit for certain.
+    pub fn lane(&self, i: usize) -> Option<f32> {
+        let bit = 1 << i;
+        (self.mask.bits() & bit != 0 && self.doubt.bits() & bit == 0).then(|| self.t.to_array()[i])
+    }
+}

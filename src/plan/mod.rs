@@ -1,0 +1,54 @@
+//! What a render needs of a scene, decided once: the parts that kernels know, relative to an origin,
+//! and what can be left out.
+
+mod parts;
+mod split;
+
+use glam::DVec3;
+
+pub use self::parts::{
+    BoxPart, ConePart, CylinderPart, DiskPart, Kind, Owner, Parts, PlanePart, PolygonPart, SpherePart, TurnedBoxPart,
+};
+use crate::scene::{Material, Object, Scene, Shape, Visible};
+
+/// Decisions about one scene seen from one origin.
+#[derive(Debug)]
+pub struct Plan<'s> {
+    /// The scene.
+    pub scene: &'s Scene,
+    /// What all f32 coordinates are relative to, subtracted in f64 before they are rounded: a scene that
+    /// is moved far away renders the same.
+    pub origin: DVec3,
+    /// By material: the sides that are seen.
+    pub visible: Vec<Visible>,
+    /// Some cloud has colours.
+    pub colored: bool,
+    /// Some polygon has normals.
+    pub smooth: bool,
+}
+
+impl<'s> Plan<'s> {
+    /// Plans for rays that are given relative to `origin`.
+    pub fn new(scene: &'s Scene, origin: DVec3) -> Self {
+        let visible = scene.materials.iter().map(|material: &Material| material.visible).collect();
+        let colored = scene.clouds.iter().any(|cloud| cloud.colors.is_some());
+        let has_normals = |object: &Object| match &object.shape {
+            Shape::Polygon(polygon) => !polygon.normals.is_empty(),
+            _ => false,
+        };
+        let smooth = scene.objects.iter().any(has_normals);
+        Plan { scene, origin, visible, colored, smooth }
+    }
+
+    /// All parts of the scene, relative to the origin.
+    pub fn parts(&self) -> Parts {
+        Parts::new(self.scene, self.origin)
+    }
+
+    /// The material of the side that a ray met.
+    #[inline(always)]
+    pub fn side_material(&self, material: u32, front: bool) -> u32 {
+        let back = self.scene.materials[material as usize].back;
+        back.filter(|_| !front).map_or(material, |back| back as u32)
+    }
+}

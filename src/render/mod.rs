@@ -1,0 +1,318 @@
+//! A frame: tiles over the cores, cancellation, statistics.
+
+mod block;
+mod stats;
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+pub use self::stats::Stats;
+
+use self::block::{Block, BlockWork};
+use crate::accel::Tree;
+use crate::film::{Picture, Window};
+use crate::integrate::{CameraRays, Direct, Record, Silent};
+use crate::plan::Plan;
+use crate::scene::{Camera, ImageSettings, Scene};
+
+/// Which tracer finds the hits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Engine {
+    /// Tiles of packets where rays agree, single rays where they do not.
+    #[default]
+    Packet,
+    /// Every ray by itself: the same bits, more slowly.
+    Single,
+}
+
+/// Told how a render goes on, and asked whether it is to go on. Called from any thread.
+pub trait Progress: Sync {
+    /// `done` of `total` samples are finished.
+    fn advance(&self, done: u64, total: u64);
+    /// Whether to stop as soon as possible.
+    fn cancelled(&self) -> bool {
+        false
+    }
+}
+
+/// Nobody to tell.
+impl Progress for () {
+    fn advance(&self, _: u64, _: u64) {}
+}
+
+/// Why there is no picture.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum RenderError {
+    /// The scene has no camera.
+    #[error("the scene has no camera: add a [camera] table with eye, target and vfov")]
+    NoCamera,
+    /// No camera of this name; the names there are.
+    #[error("there is no camera named \"{name}\" in the scene; it has {known}")]
+    UnknownCamera {
+        /// The name asked for.
+        name: String,
+        /// The names there are, for a reader.
+        known: String,
+    },
+    /// The scene has no image size.
+    #[error("the scene has no image size: add an [image] table with width and height, or say --resolution WxH")]
+    NoImage,
+    /// The window lies outside the picture, or holds nothing.
+    #[error("the crop {window} does not lie inside the picture of {width}x{height} pixels")]
+    BadWindow {
+        /// The window asked for.
+        window: Window,
+        /// Of the display window.
+        width: u32,
+        /// Of the display window.
+        height: u32,
+    },
+    /// The threads could not be started.
+    #[error("cannot start threads: {0}")]
+    Threads(String),
+    /// Asked to stop.
+    #[error("stopped before the picture was finished")]
+    Cancelled,
+}
+
+/// Renders pictures of one scene.
+///
+/// ```no_run
+/// use octray::{Renderer, Scene};
+/// let scene = Scene::load("scenes/fig5.toml")?;
+/// let rendering = Renderer::new(&scene)?.spp(64).render(&())?;
+/// println!("{} camera rays", rendering.stats.rays.rays[0]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Renderer<'s> {
+    scene: &'s Scene,
+    camera: &'s Camera,
+    image: ImageSettings,
+    window: Option<Window>,
+    max_depth: u32,
+    seed: u64,
+    threads: usize,
+    skip: bool,
+    engine: Engine,
+}
+
+/// A picture and how it came about.
+#[derive(Debug, Clone)]
+pub struct Rendering {
+    /// The picture.
+    pub picture: Picture,
+    /// Work and time.
+    pub stats: Stats,
+}
+
+impl<'s> Renderer<'s> {
+    /// The scene's own settings and first camera.
+    pub fn new(scene: &'s Scene) -> Result<Self, RenderError> {
+        Ok(Renderer {
+            scene,
+            camera: scene.camera(None).ok_or(RenderError::NoCamera)?,
+            image: scene.image.clone().ok_or(RenderError::NoImage)?,
+            window: None,
+            max_depth: scene.render.max_depth,
+            seed: scene.render.seed,
+            threads: 0,
+            skip: true,
+            engine: Engine::Packet,
+        })
+    }
+
+    /// Another camera, by name.
+    pub fn camera(mut self, name: &str) -> Result<Self, RenderError> {
+        let known = || {
+            let names: Vec<&str> = self.scene.cameras.iter().filter_map(|camera| camera.name.as_deref()).collect();
+            if names.is_empty() { "none with a name".into() } else { names.join(", ") }
+        };
+        self.camera = self
+            .scene
+            .camera(Some(name))
+            .ok_or_else(|| RenderError::UnknownCamera { name: name.into(), known: known() })?;
+        Ok(self)
+    }
+
+    /// Samples per pixel, at least 1; a single one sits at the pixel's centre.
+    pub fn spp(mut self, spp: u32) -> Self {
+        self.image.spp = spp.max(1);
+        self
+    }
+
+    /// Pixels of the whole picture.
+    pub fn resolution(mut self, width: u32, height: u32) -> Self {
+        (self.image.width, self.image.height) = (width, height);
+        self
+    }
+
+    /// Only the pixels of a window: the same bits as in the whole picture.
+    pub fn crop(mut self, window: Window) -> Self {
+        self.window = Some(window);
+        self
+    }
+
+    /// Longest chain of rays, the camera ray being 1.
+    pub fn max_depth(mut self, depth: u32) -> Self {
+        self.max_depth = depth;
+        self
+    }
+
+    /// Chooses the sample pattern.
+    pub fn seed(mut self, seed: u64) -> Self {
+        self.seed = seed;
+        self
+    }
+
+    /// Threads to use; 0: as many as there are cores for this process.
+    pub fn threads(mut self, threads: usize) -> Self {
+        self.threads = threads;
+        self
+    }
+
+    /// With `false`, does all the work, needed or not; the picture is the same to the bit.
+    pub fn skip(mut self, skip: bool) -> Self {
+        self.skip = skip;
+        self
+    }
+
+    /// Which tracer finds the hits.
+    pub fn engine(mut self, engine: Engine) -> Self {
+        self.engine = engine;
+        self
+    }
+
+    /// The settings in force.
+    pub fn image(&self) -> &ImageSettings {
+        &self.image
+    }
+
+    /// The camera in force.
+    pub fn view(&self) -> &'s Camera {
+        self.camera
+    }
+
+    /// The longest chain of rays in force.
+    pub fn depth(&self) -> u32 {
+        self.max_depth
+    }
+
+    /// The seed in force.
+    pub fn pattern(&self) -> u64 {
+        self.seed
+    }
+
+    /// Renders the picture.
+    pub fn render(&self, progress: &dyn Progress) -> Result<Rendering, RenderError> {
+        let window = self.checked_window()?;
+        let threads = match self.threads {
+            0 => std::thread::available_parallelism().map_or(1, usize::from),
+            threads => threads,
+        };
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool = pool.map_err(|error| RenderError::Threads(error.to_string()))?;
+        pool.install(|| {
+            let frame = Frame::prepare(self);
+            let (blocks, trace_seconds) = frame.trace(window, progress)?;
+            let mut picture = Picture::new((self.image.width, self.image.height), window);
+            let mut stats = frame.stats(threads, trace_seconds);
+            for (block, work) in blocks {
+                block.copy_to(&work.pixels, &mut picture);
+                stats.add(&work);
+            }
+            Ok(Rendering { picture, stats })
+        })
+    }
+
+    /// Traces some pixels, in order, on this thread, while a record looks on; returns their values.
+    pub fn render_pixels<R: Record>(
+        &self,
+        pixels: &[(i32, i32)],
+        mut record: impl FnMut(usize) -> R,
+    ) -> Vec<([f32; 4], R)> {
+        let prepared = Frame::prepare(self);
+        let mut one = |(index, &(x, y))| {
+            let mut record = record(index);
+            let block = Block::new(Window { x0: x, y0: y, x1: x + 1, y1: y + 1 });
+            let work = block.trace(&prepared.rays, &prepared.direct(), self.image.spp, &mut record);
+            (work.pixels[0], record)
+        };
+        pixels.iter().enumerate().map(&mut one).collect()
+    }
+
+    fn checked_window(&self) -> Result<Window, RenderError> {
+        let display = (self.image.width, self.image.height);
+        let full = Window::full(display);
+        let window = self.window.unwrap_or(full);
+        match window.area() > 0 && full.holds(&window) {
+            true => Ok(window),
+            false => Err(RenderError::BadWindow { window, width: display.0, height: display.1 }),
+        }
+    }
+}
+
+/// One frame with its tree built.
+struct Frame<'s> {
+    plan: Plan<'s>,
+    tree: Tree,
+    rays: CameraRays,
+    spp: u32,
+    max_depth: u32,
+    skip: bool,
+    plan_seconds: f64,
+    build_seconds: f64,
+}
+
+impl<'s> Frame<'s> {
+    fn prepare(renderer: &Renderer<'s>) -> Self {
+        let start = Instant::now();
+        let plan = Plan::new(renderer.scene, renderer.camera.eye);
+        let parts = plan.parts();
+        let plan_seconds = start.elapsed().as_secs_f64();
+        let tree = Tree::new(parts, &plan.visible).one_by_one(renderer.engine == Engine::Single);
+        let build_seconds = start.elapsed().as_secs_f64() - plan_seconds;
+        let image = &renderer.image;
+        let display = (image.width, image.height);
+        let rays = CameraRays::new(renderer.camera, plan.origin, display, image.filter, image.spp, renderer.seed);
+        let (max_depth, skip) = (renderer.max_depth, renderer.skip);
+        Frame { plan, tree, rays, spp: image.spp, max_depth, skip, plan_seconds, build_seconds }
+    }
+
+    fn direct(&self) -> Direct<'_> {
+        Direct::new(&self.plan, &self.tree, self.max_depth, self.skip)
+    }
+
+    fn trace(&self, window: Window, progress: &dyn Progress) -> Result<(Vec<(Block, BlockWork)>, f64), RenderError> {
+        let start = Instant::now();
+        let direct = self.direct();
+        let (done, stop) = (AtomicU64::new(0), AtomicBool::new(false));
+        let total = window.area() as u64 * u64::from(self.spp);
+        let work = |block: Block| {
+            if stop.load(Ordering::Relaxed) || progress.cancelled() {
+                stop.store(true, Ordering::Relaxed);
+                return None;
+            }
+            let work = block.trace(&self.rays, &direct, self.spp, &mut Silent);
+            let samples = block.window.area() as u64 * u64::from(self.spp);
+            progress.advance(done.fetch_add(samples, Ordering::Relaxed) + samples, total);
+            Some((block, work))
+        };
+        let blocks: Option<Vec<_>> = Block::cover(window).into_par_iter().map(work).collect();
+        Ok((blocks.ok_or(RenderError::Cancelled)?, start.elapsed().as_secs_f64()))
+    }
+
+    fn stats(&self, threads: usize, trace_seconds: f64) -> Stats {
+        Stats {
+            threads,
+            plan_seconds: self.plan_seconds,
+            build_seconds: self.build_seconds,
+            trace_seconds,
+            column_bytes: self.tree.stores().column_bytes(),
+            tree_bytes: self.tree.bytes(),
+            ..Stats::default()
+        }
+    }
+}

@@ -1,0 +1,39 @@
+//! What a render did.
+
+use super::block::BlockWork;
+use crate::accel::Counts;
+use crate::integrate::RayCounts;
+
+/// Work and time of one frame. Counts are exact and do not depend on threads; seconds are wall time.
+#[derive(Debug, Default, Clone, PartialEq)]
+pub struct Stats {
+    /// Threads used.
+    pub threads: usize,
+    /// Taking the scene apart.
+    pub plan_seconds: f64,
+    /// Columns and tree.
+    pub build_seconds: f64,
+    /// Tracing and shading.
+    pub trace_seconds: f64,
+    /// Rays by kind.
+    pub rays: RayCounts,
+    /// Box and primitive tests.
+    pub tests: Counts,
+    /// Tiles of up to 64 camera rays.
+    pub tiles: u64,
+    /// Those in which no camera ray met anything.
+    pub background_tiles: u64,
+    /// Memory of the columns.
+    pub column_bytes: usize,
+    /// Memory of the tree.
+    pub tree_bytes: usize,
+}
+
+impl Stats {
+    pub(super) fn add(&mut self, work: &BlockWork) {
+        self.rays.add(&work.room.rays);
+        self.tests.add(&work.room.walk.counts);
+        self.tiles += work.tiles;
+        self.background_tiles += work.background_tiles;
+    }
+}

@@ -1,0 +1,12 @@
+//! What surfaces, lights and the background make of light, eight lanes at a time. The meaning of each
+//! is said beside its data in [`scene`](crate::scene).
+
+pub mod attributes;
+mod background;
+mod light;
+mod material;
+mod texture;
+
+pub use self::background::Backdrop8;
+pub use self::light::{Illumination, LightTable, Toward};
+pub use self::material::{Bsdf8, MaterialTable};

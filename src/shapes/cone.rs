@@ -1,0 +1,207 @@
+//! The mantles of cones and frusta. Their caps are disks of the same primitive.
+
+use glam::{DVec2, DVec3};
+
+use super::cylinder::about_axis;
+use super::sphere::copysign;
+use super::{Hidden8, Ray64, Sides, Store, Surface8, column_of, roundings};
+use crate::lanes::{Column, Column3, Float8, Hit8, LANES, Mask8, RayPacket, Vec3x8, difference_of_products, float8};
+use crate::plan::{ConePart, Owner};
+use crate::scene::Visible;
+
+/// All cones of a render.
+#[derive(Debug)]
+pub struct Cones {
+    base: Column3,  // scene units
+    axis: Column3,  // unit, from base to apex
+    height: Column, // scene units, > 0
+    radius: Column, // at the base, scene units, >= 0
+    slope: Column,  // change of the radius per unit of height
+    sides: Sides,
+    parts: Vec<ConePart>,
+}
+
+/// Eight rows.
+#[derive(Debug, Clone, Copy)]
+pub struct Row {
+    base: Vec3x8,
+    axis: Vec3x8,
+    height: Float8,
+    radius: Float8,
+    slope: Float8,
+    hidden: Hidden8,
+}
+
+/// Eight rows seen from eight origins.
+#[derive(Debug, Clone, Copy)]
+pub struct Anchor {
+    f: Vec3x8, // from the origin to the base
+    axis: Vec3x8,
+    height: Float8,
+    radius: Float8,
+    slope: Float8,
+    hidden: Hidden8,
+}
+
+impl Store for Cones {
+    type Part = ConePart;
+    type Row = Row;
+    type Anchor = Anchor;
+
+    fn new(parts: Vec<ConePart>, sides: Sides) -> Self {
+        let base = Column3::new(parts.iter().map(|part| part.base));
+        let axis = Column3::new(parts.iter().map(|part| part.axis));
+        let height = column_of(&parts, |part| part.height);
+        let radius = column_of(&parts, |part| part.radius);
+        let slope = column_of(&parts, ConePart::slope);
+        Cones { base, axis, height, radius, slope, sides, parts }
+    }
+
+    fn parts(&self) -> &[ConePart] {
+        &self.parts
+    }
+
+    #[inline(always)]
+    fn splat(&self, i: usize) -> Row {
+        let (base, axis, height) = (self.base.splat(i), self.axis.splat(i), self.height.splat(i));
+        Row {
+            base,
+            axis,
+            height,
+            radius: self.radius.splat(i),
+            slope: self.slope.splat(i),
+            hidden: self.sides.splat(i),
+        }
+    }
+
+    #[inline(always)]
+    fn block(&self, i: usize) -> Row {
+        let (base, axis, height) = (self.base.block(i), self.axis.block(i), self.height.block(i));
+        Row {
+            base,
+            axis,
+            height,
+            radius: self.radius.block(i),
+            slope: self.slope.block(i),
+            hidden: self.sides.block(i),
+        }
+    }
+
+    fn gather(&self, rows: [u32; LANES]) -> Row {
+        let hidden = self.sides.lanes(|lane| rows[lane] as usize);
+        let (base, axis, height) = (self.base.gather(rows), self.axis.gather(rows), self.height.gather(rows));
+        Row { base, axis, height, radius: self.radius.gather(rows), slope: self.slope.gather(rows), hidden }
+    }
+
+    #[inline(always)]
+    fn anchor(row: &Row, origin: &Vec3x8) -> Anchor {
+        let Row { base, axis, height, radius, slope, hidden } = *row;
+        Anchor { f: base - *origin, axis, height, radius, slope, hidden }
+    }
+
+    /// Points at height `w` and distance `rho` from the axis with `rho = radius + slope w`, a quadratic in
+    /// t from the ray's point nearest the base; its discriminant from compensated products, its roots by
+    /// quotient and product. Heights outside 0..height drop the mirror cone as well. Along the way the
+    /// sign of `A t + B` says which side of the mantle a root meets.
+    #[inline(always)]
+    fn hit<const CULL: bool>(anchor: &Anchor, rays: &RayPacket) -> Hit8 {
+        let Anchor { f, axis, height, radius, slope, hidden } = *anchor;
+        let p = f.dot(rays.dir) * rays.inv_dd;
+        let g = rays.dir.mul_add(p, -f); // from the base to the nearest point
+        let (gw, dw) = (g.dot(axis), rays.dir.dot(axis));
+        let (gx, dx) = (axis.mul_add(-gw, g), axis.mul_add(-dw, rays.dir));
+        let (rho, turn) = (slope.mul_add(gw, radius), slope * dw);
+        let a = dx.dot(dx) - turn * turn;
+        let b = dx.dot(gx) - turn * rho;
+        let c = gx.dot(gx) - rho * rho;
+        let disc = difference_of_products(b, b, a, c);
+        if !Mask8::ge(disc, Float8::ZERO).any() {
+            return Hit8::none();
+        }
+        let root = copysign(disc.sqrt(), b);
+        let z = -(b + root);
+        let (t1, t2) = (z / a, c / z);
+        // A t + B is -root at t1 and +root at t2: negative where the ray goes in.
+        let first_enters = !Mask8::sign(root);
+        let ok = |t: Float8, enters: Mask8| {
+            let w = t.mul_add(dw, gw);
+            let mut ok = rays.accepts(p + t) & Mask8::ge(w, Float8::ZERO) & Mask8::le(w, height);
+            if CULL {
+                ok &= !((enters & hidden.front) | (!enters & hidden.back));
+            }
+            ok
+        };
+        let (ok1, ok2) = (ok(t1, first_enters), ok(t2, !first_enters));
+        let far = float8(f32::INFINITY);
+        let t = p + ok1.select(t1, far).fast_min(ok2.select(t2, far));
+        Hit8 { t, mask: ok1 | ok2, doubt: Mask8::NONE }
+    }
+
+    fn decide(part: &ConePart, ray: &Ray64, visible: Visible) -> Option<f64> {
+        let k = part.slope();
+        let g = ray.origin - part.base;
+        let (gw, dw) = (g.dot(part.axis), ray.dir.dot(part.axis));
+        let (gx, dx) = (g - part.axis * gw, ray.dir - part.axis * dw);
+        let rho = part.radius + k * gw;
+        let a = dx.length_squared() - (k * dw).powi(2);
+        let b = dx.dot(gx) - k * dw * rho;
+        let c = gx.length_squared() - rho * rho;
+        let disc = b * b - a * c;
+        if disc < 0.0 {
+            return None;
+        }
+        let z = -(b + disc.sqrt().copysign(b));
+        let mut roots = [z / a, c / z];
+        roots.sort_by(f64::total_cmp);
+        let keep = |t: &f64| {
+            let enters = a * t + b < 0.0;
+            let shown = visible == Visible::Both || enters == (visible == Visible::Front);
+            shown && ray.accepts(*t) && (0.0..=part.height).contains(&(gw + t * dw))
+        };
+        roots.into_iter().find(keep)
+    }
+
+    fn surface(row: &Row, rays: &RayPacket, t: Float8) -> Surface8 {
+        let f = row.base - rays.origin;
+        let p = f.dot(rays.dir) * rays.inv_dd;
+        let from_base = rays.dir.mul_add(t - p, rays.dir.mul_add(p, -f));
+        let w = from_base.dot(row.axis);
+        let radial = row.axis.mul_add(-w, from_base);
+        let length = radial.length();
+        // At the tip there is no radial direction; the axis stands in for it.
+        let at_tip = !Mask8::gt(length, Float8::ZERO);
+        let radial = Vec3x8::select(at_tip, row.axis, radial * (float8(1.0) / length));
+        let normal = row.axis.mul_add(-row.slope, radial).normalize();
+        let rho = row.slope.mul_add(w, row.radius).fast_max(Float8::ZERO);
+        let point = radial.mul_add(at_tip.select(Float8::ZERO, rho), row.axis.mul_add(w, row.base));
+        let reach = row.base.abs();
+        let size = row.height + row.radius + rho;
+        let error = roundings(6.0) * (reach.x + reach.y + reach.z + size);
+        Surface8 { point, normal, error }
+    }
+
+    fn uv(part: &ConePart, point: DVec3) -> DVec2 {
+        about_axis(point - part.base, part.axis, part.height)
+    }
+
+    fn bounds(part: &ConePart) -> (DVec3, DVec3) {
+        let a = part.axis;
+        let half = DVec3::new(a.y.hypot(a.z), a.z.hypot(a.x), a.x.hypot(a.y));
+        let apex = part.base + a * part.height;
+        let (low, high) = (half * part.radius, half * part.apex_radius);
+        ((part.base - low).min(apex - high), (part.base + low).max(apex + high))
+    }
+
+    fn owner(part: &ConePart) -> Owner {
+        part.owner
+    }
+
+    fn sides(&self) -> &Sides {
+        &self.sides
+    }
+
+    fn column_bytes(&self) -> usize {
+        let scalars = [&self.height, &self.radius, &self.slope];
+        self.base.bytes() + self.axis.bytes() + scalars.iter().map(|column| column.bytes()).sum::<usize>()
+    }
+}

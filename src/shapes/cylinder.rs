@@ -1,0 +1,179 @@
+//! The mantles of cylinders. Their caps are disks of the same primitive.
+
+use std::f64::consts::TAU;
+
+use glam::{DVec2, DVec3};
+
+use super::sphere::copysign;
+use super::{Hidden8, Ray64, Sides, Store, Surface8, column_of, roundings};
+use crate::lanes::{Column, Column3, Float8, Hit8, LANES, Mask8, RayPacket, Vec3x8};
+use crate::plan::{CylinderPart, Owner};
+use crate::scene::{Visible, basis};
+
+/// All cylinders of a render.
+#[derive(Debug)]
+pub struct Cylinders {
+    base: Column3,  // scene units
+    axis: Column3,  // unit, from base to apex
+    height: Column, // scene units, > 0
+    radius: Column, // scene units, > 0
+    sides: Sides,
+    parts: Vec<CylinderPart>,
+}
+
+/// Eight rows.
+#[derive(Debug, Clone, Copy)]
+pub struct Row {
+    base: Vec3x8,
+    axis: Vec3x8,
+    height: Float8,
+    radius: Float8,
+    hidden: Hidden8,
+}
+
+/// Eight rows seen from eight origins.
+#[derive(Debug, Clone, Copy)]
+pub struct Anchor {
+    f: Vec3x8, // from the origin to the base
+    axis: Vec3x8,
+    height: Float8,
+    r2: Float8,
+    hidden: Hidden8,
+}
+
+impl Store for Cylinders {
+    type Part = CylinderPart;
+    type Row = Row;
+    type Anchor = Anchor;
+
+    fn new(parts: Vec<CylinderPart>, sides: Sides) -> Self {
+        let base = Column3::new(parts.iter().map(|part| part.base));
+        let axis = Column3::new(parts.iter().map(|part| part.axis));
+        let height = column_of(&parts, |part| part.height);
+        let radius = column_of(&parts, |part| part.radius);
+        Cylinders { base, axis, height, radius, sides, parts }
+    }
+
+    fn parts(&self) -> &[CylinderPart] {
+        &self.parts
+    }
+
+    #[inline(always)]
+    fn splat(&self, i: usize) -> Row {
+        let (base, axis) = (self.base.splat(i), self.axis.splat(i));
+        Row { base, axis, height: self.height.splat(i), radius: self.radius.splat(i), hidden: self.sides.splat(i) }
+    }
+
+    #[inline(always)]
+    fn block(&self, i: usize) -> Row {
+        let (base, axis) = (self.base.block(i), self.axis.block(i));
+        Row { base, axis, height: self.height.block(i), radius: self.radius.block(i), hidden: self.sides.block(i) }
+    }
+
+    fn gather(&self, rows: [u32; LANES]) -> Row {
+        let hidden = self.sides.lanes(|lane| rows[lane] as usize);
+        let (base, axis) = (self.base.gather(rows), self.axis.gather(rows));
+        Row { base, axis, height: self.height.gather(rows), radius: self.radius.gather(rows), hidden }
+    }
+
+    #[inline(always)]
+    fn anchor(row: &Row, origin: &Vec3x8) -> Anchor {
+        let f = row.base - *origin;
+        Anchor { f, axis: row.axis, height: row.height, r2: row.radius * row.radius, hidden: row.hidden }
+    }
+
+    /// The sphere's test in the plane across the axis, from the ray's point nearest the base, where the
+    /// numbers are as small as the cylinder: then the axial part is dropped, and added back for heights.
+    ///
+    /// Source: after Haines, Günther and Akenine-Möller, Ray Tracing Gems, 2019, chapter 7.
+    #[inline(always)]
+    fn hit<const CULL: bool>(anchor: &Anchor, rays: &RayPacket) -> Hit8 {
+        let Anchor { f, axis, height, r2, hidden } = *anchor;
+        let p = f.dot(rays.dir) * rays.inv_dd;
+        let q = rays.dir.mul_add(-p, f);
+        let (da, qa) = (rays.dir.dot(axis), q.dot(axis));
+        let (d2, q2) = (axis.mul_add(-da, rays.dir), axis.mul_add(-qa, q));
+        let (qd, dd) = (q2.dot(d2), d2.dot(d2));
+        let perp = d2.mul_add(-(qd / dd), q2);
+        let slack = r2 - perp.dot(perp);
+        if !Mask8::ge(slack, Float8::ZERO).any() {
+            return Hit8::none();
+        }
+        let z = qd + copysign((slack * dd).sqrt(), qd);
+        let (a, b) = (z / dd, (q2.dot(q2) - r2) / z);
+        let (entry, exit) = (a.fast_min(b), a.fast_max(b));
+        let within = |t: Float8| {
+            let w = t.mul_add(da, -qa);
+            Mask8::ge(w, Float8::ZERO) & Mask8::le(w, height)
+        };
+        let mut entry_ok = rays.accepts(p + entry) & within(entry);
+        let mut exit_ok = rays.accepts(p + exit) & within(exit);
+        if CULL {
+            entry_ok &= !hidden.front;
+            exit_ok &= !hidden.back;
+        }
+        Hit8 { t: entry_ok.select(p + entry, p + exit), mask: entry_ok | exit_ok, doubt: Mask8::NONE }
+    }
+
+    fn decide(part: &CylinderPart, ray: &Ray64, visible: Visible) -> Option<f64> {
+        let across = |v: DVec3| v - part.axis * v.dot(part.axis);
+        let f = part.base - ray.origin;
+        let (f2, d2) = (across(f), across(ray.dir));
+        let (fd, dd) = (f2.dot(d2), d2.length_squared());
+        let disc = part.radius * part.radius * dd - f2.cross(d2).length_squared();
+        if disc < 0.0 {
+            return None;
+        }
+        let z = fd + disc.sqrt().copysign(fd);
+        let (a, b) = (z / dd, (f2.length() - part.radius) * (f2.length() + part.radius) / z);
+        let keep = |t: &f64| {
+            let w = (t * ray.dir - f).dot(part.axis);
+            (0.0..=part.height).contains(&w) && ray.accepts(*t)
+        };
+        let entry = Some(a.min(b)).filter(keep).filter(|_| visible != Visible::Back);
+        entry.or_else(|| Some(a.max(b)).filter(keep).filter(|_| visible != Visible::Front))
+    }
+
+    fn surface(row: &Row, rays: &RayPacket, t: Float8) -> Surface8 {
+        let f = row.base - rays.origin;
+        let p = f.dot(rays.dir) * rays.inv_dd;
+        let from_base = rays.dir.mul_add(t - p, rays.dir.mul_add(p, -f));
+        let w = from_base.dot(row.axis);
+        let normal = row.axis.mul_add(-w, from_base).normalize();
+        let point = normal.mul_add(row.radius, row.axis.mul_add(w, row.base));
+        let reach = row.base.abs();
+        let size = row.height + row.radius;
+        let error = roundings(6.0) * (reach.x + reach.y + reach.z + size);
+        Surface8 { point, normal, error }
+    }
+
+    fn uv(part: &CylinderPart, point: DVec3) -> DVec2 {
+        about_axis(point - part.base, part.axis, part.height)
+    }
+
+    fn bounds(part: &CylinderPart) -> (DVec3, DVec3) {
+        let a = part.axis;
+        let half = DVec3::new(a.y.hypot(a.z), a.z.hypot(a.x), a.x.hypot(a.y)) * part.radius;
+        let apex = part.base + a * part.height;
+        (part.base.min(apex) - half, part.base.max(apex) + half)
+    }
+
+    fn owner(part: &CylinderPart) -> Owner {
+        part.owner
+    }
+
+    fn sides(&self) -> &Sides {
+        &self.sides
+    }
+
+    fn column_bytes(&self) -> usize {
+        self.base.bytes() + self.axis.bytes() + self.height.bytes() + self.radius.bytes()
+    }
+}
+
+/// u = azimuth/2pi in the basis of the axis, v = share of the height.
+pub(super) fn about_axis(from_base: DVec3, axis: DVec3, height: f64) -> DVec2 {
+    let (x, y) = basis(axis);
+    let azimuth = from_base.dot(y).atan2(from_base.dot(x)) / TAU;
+    DVec2::new(azimuth - azimuth.floor(), from_base.dot(axis) / height)
+}
