@@ -13,6 +13,7 @@ pub mod error;
 mod image;
 mod light;
 mod material;
+pub mod nff;
 mod shape;
 mod texture;
 
