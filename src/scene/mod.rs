@@ -16,6 +16,7 @@ mod material;
 pub mod nff;
 mod shape;
 mod texture;
+pub mod write;
 
 use std::borrow::Cow;
 
