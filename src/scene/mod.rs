@@ -14,6 +14,7 @@ mod image;
 mod light;
 mod material;
 pub mod nff;
+pub mod rules;
 mod shape;
 mod texture;
 pub mod write;
