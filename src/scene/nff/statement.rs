@@ -11,13 +11,11 @@ use glam::DVec3;
 use super::surface::{Seen, Surfaces};
 use super::tokens::{Token, Tokens};
 use crate::scene::error::{Source, shorten};
+use crate::scene::rules::{self, Broken, Rule};
 use crate::scene::{Cone, Cylinder, Object, Polygon, SceneErrors, Shape, Sphere, Warning};
 
 const KEYWORDS: [&str; 8] = ["v", "b", "l", "f", "s", "c", "p", "pp"];
 const VIEW_WORDS: [&str; 6] = ["from", "at", "up", "angle", "hither", "resolution"];
-/// Largest size of any number, as for all scenes.
-const MOST: f64 = 1e15;
-const MOST_CORNERS: usize = 65_535;
 const MOST_SIDE: u32 = 65_536;
 const MOST_PIXELS: u64 = 1 << 30;
 
@@ -128,28 +126,21 @@ impl<'a> Statements<'a> {
         if self.view.is_some() {
             self.wrong(self.keyword, "a file must have one view");
         }
-        let [from, at, up] = [from, at, up].map(vector);
-        self.check_axes(from, at, up);
         let [width, height] = sides;
         if u64::from(width) * u64::from(height) > MOST_PIXELS {
             self.wrong(resolution[0].token, "a picture must have at most 2^30 pixels");
         }
+        let [from, at, up] = [from, at, up].map(vector);
+        let view = View { from, at, up, angle: angle.value, resolution: sides };
         // The edges of a coarse picture are farther out than its centres: their angle must be one, too.
         let edges = super::edge_angle(angle.value, height);
-        if !(angle.value > 0.0 && angle.value < 180.0 && edges > 0.0 && edges < 180.0) {
+        if [angle.value, edges].into_iter().any(|angle| Rule::VFOV.broken_by(angle).is_some()) {
             self.wrong(angle.token, "the view's angle must be between 0 and 180 degrees");
+        } else if let Err(broken) = rules::camera(&super::camera(&view)) {
+            self.broken(broken);
         }
-        self.view = Some(View { from, at, up, angle: angle.value, resolution: sides });
+        self.view = Some(view);
         Ok(())
-    }
-
-    fn check_axes(&mut self, from: DVec3, at: DVec3, up: DVec3) {
-        let forward = (at - from).normalize_or_zero();
-        if forward == DVec3::ZERO {
-            self.wrong(self.keyword, "`from` must differ from `at`");
-        } else if up == DVec3::ZERO || forward.cross(up).normalize_or_zero() == DVec3::ZERO {
-            self.wrong(self.keyword, "`up` must not be zero or parallel to the view");
-        }
     }
 
     /// One line of the view: its word and the numbers after it.
@@ -217,9 +208,10 @@ impl<'a> Statements<'a> {
         }
         if radius.value == 0.0 {
             self.wrong(radius.token, "sphere radius must not be 0");
+            return Ok(());
         }
         let shape = Shape::Sphere(Sphere { center: vector([x, y, z]), radius: radius.value.abs() });
-        self.object(shape, seen(radius.value));
+        self.solid(shape, seen(radius.value));
         Ok(())
     }
 
@@ -230,25 +222,30 @@ impl<'a> Statements<'a> {
         if self.errors.len() > start {
             return Ok(());
         }
-        let (base, apex) = (vector([x, y, z]), vector([ax, ay, az]));
-        if base == apex {
-            self.wrong(self.keyword, "the apex of a cone must differ from its base");
-        }
         if radius.value == 0.0 && apex_radius.value == 0.0 {
             self.wrong(radius.token, "the radii of a cone must not both be 0");
+            return Ok(());
         }
         let [least, most] = [radius.value.min(apex_radius.value), radius.value.max(apex_radius.value)];
         if least < 0.0 && most > 0.0 {
             self.wrong(apex_radius.token, "the radii of a cone must have one sign");
         }
+        let (base, apex) = (vector([x, y, z]), vector([ax, ay, az]));
         let [radius, apex_radius] = [radius, apex_radius].map(|radius| radius.value.abs());
         let shape = if radius == apex_radius {
             Shape::Cylinder(Cylinder { base, apex, radius, caps: false })
         } else {
             Shape::Cone(Cone { base, apex, radius, apex_radius, caps: false })
         };
-        self.object(shape, seen(least));
+        self.solid(shape, seen(least));
         Ok(())
+    }
+
+    fn solid(&mut self, shape: Shape, seen: Seen) {
+        match rules::shape(&shape) {
+            Ok(()) => self.object(shape, seen),
+            Err(broken) => self.broken(broken),
+        }
     }
 
     fn polygon(&mut self, with_normals: bool) -> Read<()> {
@@ -272,7 +269,7 @@ impl<'a> Statements<'a> {
             }
         }
         if self.errors.len() == start {
-            self.valid_polygon(polygon, if with_normals { Seen::BothSides } else { Seen::Usual });
+            self.clean_polygon(polygon, if with_normals { Seen::BothSides } else { Seen::Usual });
         }
         Ok(())
     }
@@ -282,7 +279,7 @@ impl<'a> Statements<'a> {
         const RULE: &str = "a polygon must have a whole number of corners, 3 to 65535";
         let Some(token) = self.tokens.peek() else { return Err(self.missing(RULE)) };
         match token.text.parse::<usize>() {
-            Ok(count) if (3..=MOST_CORNERS).contains(&count) => {
+            Ok(count) if rules::polygon::count(count).is_ok() => {
                 self.tokens.next();
                 Ok(count)
             }
@@ -290,8 +287,22 @@ impl<'a> Statements<'a> {
         }
     }
 
-    fn valid_polygon(&mut self, polygon: Polygon, seen: Seen) {
-        self.object(Shape::Polygon(polygon), seen);
+    fn clean_polygon(&mut self, polygon: Polygon, seen: Seen) {
+        match rules::polygon::clean(polygon) {
+            Ok((polygon, dropped)) => {
+                if !dropped.is_empty() {
+                    let (place, text) = (self.source.place(self.keyword.at), rules::polygon::dropped_text(&dropped));
+                    self.warnings.push(Warning { place, text });
+                }
+                self.object(Shape::Polygon(polygon), seen);
+            }
+            Err(broken) => self.broken(broken),
+        }
+    }
+
+    /// A rule about the statement as a whole.
+    fn broken(&mut self, broken: Broken) {
+        self.errors.push(self.source.error(span(self.keyword), broken.rule, broken.found));
     }
 
     fn object(&mut self, shape: Shape, seen: Seen) {
@@ -325,7 +336,7 @@ impl<'a> Statements<'a> {
             self.tokens.next();
             number.token = token;
             match decimal(token.text) {
-                Some(value) if value.abs() <= MOST => number.value = value,
+                Some(value) if value.abs() <= rules::LARGEST => number.value = value,
                 Some(_) => self.wrong(token, "a number must be finite and at most 1e15 in size"),
                 None => self.wrong(token, format!("`{}` takes numbers: {usage}", self.keyword.text)),
             }

@@ -143,7 +143,7 @@ fn what_is_absent_is_black() {
 
 #[test]
 fn mistakes_are_told_by_place_rule_and_value() {
-    let cases: [(&str, &[&str]); 25] = [
+    let cases: [(&str, &[&str]); 28] = [
         ("s 0 0 0 0", &["3:9: sphere radius must not be 0, found `0`"]),
         ("s 0 0 0", &["3:8: `s` takes more numbers: x y z radius, found the end of the file"]),
         ("s 0 0 0 # radius\n\n", &["3:17: `s` takes more numbers: x y z radius, found the end of the file"]),
@@ -165,7 +165,7 @@ fn mistakes_are_told_by_place_rule_and_value() {
             "sphere 0 0 0 1\ns 0 0 0 1",
             &["3:1: a statement must start with a keyword: v b l f s c p pp, found `sphere`"],
         ),
-        ("c 0 0 0 1 0 0 0 1", &["3:1: the apex of a cone must differ from its base, found `c`"]),
+        ("c 0 0 0 1 0 0 0 1", &["3:1: cylinder apex must differ from its base, found [0, 0, 0]"]),
         ("c 0 0 0 0 0 0 1 0", &["3:9: the radii of a cone must not both be 0, found `0`"]),
         ("c 0 0 0 1 0 0 1 -1", &["3:17: the radii of a cone must have one sign, found `-1`"]),
         ("f 1 -0.5 0 1 1 1 1 1", &["3:5: a colour must be >= 0, found `-0.5`"]),
@@ -187,6 +187,20 @@ fn mistakes_are_told_by_place_rule_and_value() {
             &["4:1: `p` takes more numbers: a count, then x y z for each corner, found `s`"],
         ),
         ("p 3 0 0 0 1 0 0 1 1 0 0 1 0\ns 0 0 0 1", &["3:23: `p` in line 3 must end before this number, found `0`"]),
+        (
+            "p 4 0 0 0 1 0 0 1 1 1 0 1 0",
+            &["3:1: polygon must be flat to 1e-4 of its size, found corner 0 (the first is 0) 0.204124 off its plane"],
+        ),
+        (
+            "p 3 0 0 0 1 0 0 2 0 0",
+            &["3:1: polygon must have an area, found none: its corners are in line or cancel out"],
+        ),
+        (
+            "p 4 0 0 0 1 1 0 1 0 0 0 2 0",
+            &[
+                "3:1: polygon must not cross or touch itself, found the edges from corner 0 and from corner 2 meeting (the first is 0)",
+            ],
+        ),
         ("pp 3 0 0 0 0 0 0 1 0 0 0 0 1 0 1 0 0 0 1", &["3:12: a shading normal must not be zero, found `0`"]),
     ];
     for (body, expected) in cases {
@@ -206,15 +220,25 @@ fn mistakes_of_the_whole_file_are_told_once() {
 }
 
 #[test]
+fn corners_in_line_are_dropped_with_a_warning() {
+    let text = format!("{SURFACE}\npp 5 0 0 0 0 0 1 1 0 0 0 0 2 2 0 0 0 0 3 2 2 0 0 0 4 0 2 0 0 0 5");
+    let scene = parse(&text).unwrap();
+    let Shape::Polygon(polygon) = &scene.objects[0].shape else { panic!("{:?}", scene.objects[0]) };
+    assert_eq!(polygon.normals, [1.0, 3.0, 4.0, 5.0].map(|z| DVec3::Z * z));
+    let warning = "a.nff:3:1: warning: polygon corner 1 repeated or in line with both neighbours is dropped";
+    assert_eq!(scene.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(), [warning]);
+}
+
+#[test]
 fn a_view_is_checked_part_by_part() {
     let view = |from: &str, up: &str, angle: &str, size: &str| {
         format!("v\nfrom {from}\nat 0 0 0\nup {up}\nangle {angle}\nhither 1\nresolution {size}")
     };
     let good = ["0 0 8", "0 1 0", "45", "512 512"];
     let cases = [
-        (["0 0 0", "0 1 0", "45", "512 512"], "1:1: `from` must differ from `at`, found `v`"),
-        (["0 0 8", "0 0 -3", "45", "512 512"], "1:1: `up` must not be zero or parallel to the view, found `v`"),
-        (["0 0 8", "0 0 0", "45", "512 512"], "1:1: `up` must not be zero or parallel to the view, found `v`"),
+        (["0 0 0", "0 1 0", "45", "512 512"], "1:1: camera target must differ from its eye, found [0, 0, 0]"),
+        (["0 0 8", "0 0 -3", "45", "512 512"], "1:1: camera up must not be parallel to the view, found [0, 0, -3]"),
+        (["0 0 8", "0 0 0", "45", "512 512"], "1:1: camera up must not be zero, found [0, 0, 0]"),
         (["0 0 8", "0 1 0", "180", "512 512"], "5:7: the view's angle must be between 0 and 180 degrees, found `180`"),
         (["0 0 8", "0 1 0", "0", "512 512"], "5:7: the view's angle must be between 0 and 180 degrees, found `0`"),
         (
