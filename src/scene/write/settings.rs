@@ -1,0 +1,171 @@
+//! All of a scene but its geometry.
+
+use std::io;
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::text::{Table, list, number, path, quoted, vector};
+use crate::scene::{
+    Backdrop, Background, Camera, ColorSpace, Falloff, FilterKind, ImageSettings, Integrator, Lens, Light, Material,
+    Model, Paint, RenderSettings, Scene, Source, Texture, TextureFilter, TextureKind, Visible, Wrap,
+};
+
+/// Adds the tables of everything but shapes and clouds.
+pub(super) fn all(scene: &Scene, file: &Path, add: &mut impl FnMut(Table)) -> io::Result<()> {
+    scene.image.iter().for_each(|settings| add(image(settings)));
+    if scene.render != RenderSettings::default() {
+        add(render(&scene.render));
+    }
+    scene.cameras.iter().for_each(|lone_or_named| add(camera(lone_or_named)));
+    if let Some(table) = background(&scene.background, file)? {
+        add(table);
+    }
+    if scene.ambient != DVec3::ZERO {
+        add(Table::new("ambient").set("color", vector(scene.ambient)));
+    }
+    for named in &scene.textures {
+        add(texture(named, file)?);
+    }
+    scene.materials.iter().for_each(|named| add(material(scene, named)));
+    scene.lights.iter().for_each(|source| add(light(source)));
+    scene.groups.iter().for_each(|name| add(Table::one_of("groups").set("name", quoted(name))));
+    Ok(())
+}
+
+fn image(image: &ImageSettings) -> Table {
+    let filter = match image.filter.kind {
+        FilterKind::Box => "box",
+        FilterKind::Gaussian => "gaussian",
+        FilterKind::BlackmanHarris => "blackman-harris",
+    };
+    Table::new("image")
+        .set("width", image.width)
+        .set("height", image.height)
+        .set("spp", image.spp)
+        .set("filter", quoted(filter))
+        .set("filter_radius", number(image.filter.radius))
+}
+
+fn render(render: &RenderSettings) -> Table {
+    let integrator = match render.integrator {
+        Integrator::Direct => "direct",
+    };
+    Table::new("render")
+        .set("integrator", quoted(integrator))
+        .set("max_depth", render.max_depth)
+        .set("seed", render.seed)
+}
+
+fn camera(camera: &Camera) -> Table {
+    let table = match &camera.name {
+        Some(name) => Table::one_of("cameras").set("name", quoted(name)),
+        None => Table::new("camera"),
+    };
+    let table = match camera.lens {
+        Lens::Pinhole { vfov } => table.set("type", quoted("pinhole")).set("vfov", number(vfov)),
+        Lens::Orthographic { height } => table.set("type", quoted("orthographic")).set("height", number(height)),
+    };
+    table.set("eye", vector(camera.eye)).set("target", vector(camera.target)).set("up", vector(camera.up))
+}
+
+fn background(background: &Background, file: &Path) -> io::Result<Option<Table>> {
+    let table = Table::new("background");
+    let table = match &background.backdrop {
+        Backdrop::Color(DVec3::ZERO) if !background.transparent => return Ok(None),
+        Backdrop::Color(color) => table.set("color", vector(*color)),
+        Backdrop::Gradient { top, bottom } => table.set("top", vector(*top)).set("bottom", vector(*bottom)),
+        Backdrop::Image { image, scale, rotation } => {
+            table.set("image", path(&image.file, file)?).set("scale", number(*scale)).set("rotation", number(*rotation))
+        }
+    };
+    Ok(Some(if background.transparent { table.set("transparent", true) } else { table }))
+}
+
+fn texture(texture: &Texture, file: &Path) -> io::Result<Table> {
+    let table = Table::named("textures", &texture.name);
+    Ok(match &texture.kind {
+        TextureKind::Checker(checker) => table
+            .set("type", quoted("checker"))
+            .set("colors", list(checker.colors.into_iter().map(vector)))
+            .set("scale", list(checker.scale.into_iter().map(number))),
+        TextureKind::Image(image) => {
+            let wrap = match image.wrap {
+                Wrap::Repeat => "repeat",
+                Wrap::Clamp => "clamp",
+            };
+            let filter = match image.filter {
+                TextureFilter::Bilinear => "bilinear",
+                TextureFilter::Nearest => "nearest",
+            };
+            let color_space = match image.color_space {
+                ColorSpace::Srgb => "srgb",
+                ColorSpace::Linear => "linear",
+            };
+            table
+                .set("type", quoted("image"))
+                .set("file", path(&image.file, file)?)
+                .set("wrap", quoted(wrap))
+                .set("filter", quoted(filter))
+                .set("color_space", quoted(color_space))
+        }
+    })
+}
+
+fn material(scene: &Scene, material: &Material) -> Table {
+    let paint = |paint| match paint {
+        Paint::Color(color) => vector(color),
+        Paint::Texture(texture) => format!("{{ texture = {} }}", quoted(&scene.textures[texture].name)),
+    };
+    let table = Table::named("materials", &material.name);
+    let table = match material.model {
+        Model::Diffuse { albedo } => table.set("type", quoted("diffuse")).set("albedo", paint(albedo)),
+        Model::Mirror { reflectance } => table.set("type", quoted("mirror")).set("reflectance", paint(reflectance)),
+        Model::Dielectric { ior, tint } => {
+            table.set("type", quoted("dielectric")).set("ior", number(ior)).set("tint", paint(tint))
+        }
+        Model::Phong { color, kd, ks, shine, transmittance, ior } => table
+            .set("type", quoted("phong"))
+            .set("color", paint(color))
+            .set("kd", number(kd))
+            .set("ks", number(ks))
+            .set("shine", number(shine))
+            .set("transmittance", number(transmittance))
+            .set("ior", number(ior)),
+    };
+    let table = table.set_some("back", material.back.map(|back| quoted(&scene.materials[back].name)));
+    match material.visible {
+        Visible::Both => table,
+        Visible::Front => table.set("one_sided", true),
+        Visible::Back => table.set("one_sided", quoted("back")),
+    }
+}
+
+fn light(light: &Light) -> Table {
+    let table = Table::one_of("lights").set_some("name", light.name.as_deref().map(quoted));
+    let table = match light.source {
+        Source::Point { position, intensity, falloff } => {
+            let falloff = match falloff {
+                Falloff::InverseSquare => "inverse-square",
+                Falloff::None => "none",
+            };
+            table
+                .set("type", quoted("point"))
+                .set("position", vector(position))
+                .set("intensity", vector(intensity))
+                .set("falloff", quoted(falloff))
+        }
+        Source::Directional { direction, irradiance } => table
+            .set("type", quoted("directional"))
+            .set("direction", vector(direction))
+            .set("irradiance", vector(irradiance)),
+        Source::Spot { position, direction, intensity, cone, penumbra } => table
+            .set("type", quoted("spot"))
+            .set("position", vector(position))
+            .set("direction", vector(direction))
+            .set("intensity", vector(intensity))
+            .set("cone", number(cone))
+            .set("penumbra", number(penumbra)),
+    };
+    if light.shadows { table } else { table.set("shadows", false) }
+}
