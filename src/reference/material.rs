@@ -206,11 +206,10 @@ mod tests {
 
     #[test]
     fn reflections_stay_above_the_surface() {
-        let n = DVec3::new(0.6, 0.8, 0.0);
+        let n = DVec3::new(-0.6, 0.8, 0.0);
         let bent = Side { n, n_g: DVec3::Y, dir: DVec3::new(1.0, -0.1, 0.0) };
         let plain = bent.dir - 2.0 * bent.dir.dot(n) * n;
         assert!(plain.y > 0.0 && (bent.reflection() - plain).length() == 0.0);
-        let n = DVec3::new(-0.6, 0.8, 0.0);
         let low = Side { n: -DVec3::new(-0.6, 0.1, 0.0).normalize(), n_g: DVec3::Y, dir: DVec3::new(-1.0, -0.1, 0.0) };
         let steep = Side { n, n_g: DVec3::Y, dir: DVec3::new(-1.0, -0.1, 0.0) };
         for side in [low, steep] {
