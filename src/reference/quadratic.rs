@@ -74,3 +74,53 @@ impl Quadratic {
         self.discriminant.max(0.0).sqrt()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Against integers: numbers of 24 bits make every term of the discriminant exact in 128.
+    #[test]
+    fn discriminants_are_right_to_their_smaller_terms() {
+        let mut state = 1u64;
+        let mut roll = |bits: u32| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            i128::from((state >> 33) % (1 << bits)) - (1 << (bits - 1))
+        };
+        let real = |v: [i128; 3]| DVec3::from_array(v.map(|x| x as f64));
+        let dot = |a: [i128; 3], b: [i128; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let (mut outside, mut inside) = (0, 0);
+        for case in 0..30_000 {
+            // Small and far, of the size of its distance, and almost touched by the origin.
+            let (far, size) = [(24, 4), (12, 12), (24, 24)][case % 3];
+            let mut g = [roll(far), roll(far), roll(far)];
+            let e = [roll(10), roll(10), roll(10)];
+            let (mut p, q) = (roll(size).abs(), roll(if case % 2 == 0 { 6 } else { 1 }) * i128::from(case % 2 == 0));
+            if case % 3 == 2 {
+                g = [roll(4), p + roll(3), roll(4)];
+                p = p.max(1);
+            }
+            let (a, b, c) = (dot(e, e) - q * q, dot(g, e) + p * q, dot(g, g) - p * p);
+            let exact = b * b - a * c;
+            let found = Quadratic::new(real(g), DVec3::ZERO, real(e), p as f64, q as f64);
+            assert_eq!((found.a, found.c), (a as f64, c as f64));
+            let radial: [i128; 3] = std::array::from_fn(|i| p * e[i] + q * g[i]);
+            let smaller = (b * b + (a * c).abs()).min(2 * dot(radial, radial) - exact) as f64;
+            let error = (found.discriminant - exact as f64).abs();
+            assert!(error <= 8.0 * f64::EPSILON * smaller, "{g:?} {e:?} {p} {q}: {error:e} of {smaller:e}");
+            match found.crossings() {
+                None => outside += 1,
+                Some(ends) => {
+                    inside += 1;
+                    for t in [ends.0, ends.1].into_iter().filter(|t| t.is_finite()) {
+                        let residual = (found.a * t - 2.0 * found.b) * t + found.c;
+                        let terms = found.a.abs() * t * t + 2.0 * (found.b * t).abs() + found.c.abs();
+                        let grazing = error / found.a.abs().max(1.0);
+                        assert!(residual.abs() <= 1e-14 * terms + grazing, "{g:?} {e:?} {p} {q}: {t} {residual:e}");
+                    }
+                }
+            }
+        }
+        assert!(outside > 3000 && inside > 8000, "{outside} {inside}");
+    }
+}

@@ -162,7 +162,12 @@ fn moved(shape: &Shape, turn: DQuat, shift: DVec3) -> Shape {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(400))]
+    #![proptest_config(ProptestConfig {
+        cases: 2000,
+        failure_persistence: None,
+        rng_seed: proptest::test_runner::RngSeed::Fixed(8),
+        ..ProptestConfig::default()
+    })]
 
     /// Turning or moving scene and ray together changes nothing but the last digits.
     #[test]
@@ -181,9 +186,12 @@ proptest! {
             let (a, b) = (only(shape.clone()).closest(&here), only(moved(&shape, turn, shift)).closest(&there));
             let slant = |hit: &Hit, ray: &Ray| hit.normal.dot(ray.dir.normalize()).abs();
             match (a, b) {
-                (Some(a), Some(b)) if slant(&a, &here) > 1e-3 => {
-                    // Positions near 1e6 are known to 1e-10; slant rays and curved edges magnify that.
-                    prop_assert!((a.t - b.t).abs() * here.dir.length() < 1e-6, "{:?} {:?}", a, b);
+                // Grazing: where it is met depends on the last digits.
+                (Some(a), Some(_)) if slant(&a, &here) < 1e-4 => {}
+                (Some(a), Some(b)) => {
+                    // Positions near 1e6 are known to some 1e-10; a slant magnifies that.
+                    let bound = 1e-8 / slant(&a, &here);
+                    prop_assert!((a.t - b.t).abs() * here.dir.length() < bound, "{:?} {:?}", a, b);
                     prop_assert_eq!(a.front, b.front);
                 }
                 (None, None) => {}
@@ -193,7 +201,7 @@ proptest! {
                     let tracer = only(shape.clone());
                     let roots = tracer.placed[0].body.roots(&line);
                     let margin = roots.iter().flatten().map(|root| root.margin.abs()).fold(f64::INFINITY, f64::min);
-                    prop_assert!(margin < 1e4, "{:?} {:?} {:?} {}", shape, a, b, margin);
+                    prop_assert!(margin < 1.0, "{:?} {:?} {:?} {}", shape, a, b, margin);
                 }
             }
         }
