@@ -2,8 +2,13 @@
 #![forbid(unsafe_code)]
 
 pub mod accel;
+pub mod film;
+pub mod integrate;
 pub mod lanes;
+pub mod measure;
+pub mod output;
 pub mod plan;
+pub mod reference;
 pub mod render;
 pub mod sample;
 pub mod scene;
@@ -15,5 +20,3 @@ pub use lanes::Ray;
 pub use render::{Progress, Renderer, Rendering};
 pub use scene::Scene;
 pub use tracer::{Hit, Tracer};
-pub mod film;
-pub mod integrate;

@@ -1,0 +1,70 @@
+//! Points of the picture as rays.
+
+use glam::DVec3;
+
+use super::{Ray, Reference};
+use crate::sample;
+use crate::scene::{Camera, FilterTable, ImageSettings, Lens, RenderSettings};
+
+/// A camera with the settings of its picture, ready to take it.
+#[derive(Debug, Clone)]
+pub struct View {
+    eye: DVec3,
+    right: DVec3,
+    up: DVec3,
+    forward: DVec3,
+    lens: Lens,
+    width: f64,
+    height: f64,
+    filter: FilterTable,
+    seed: u64,
+    /// Samples per pixel.
+    pub(super) spp: u32,
+    /// Longest chain of rays.
+    pub(super) max_depth: u32,
+}
+
+impl Reference {
+    /// Prepares a camera of the scene (in the scene's coordinates) for pictures of these settings.
+    pub fn view(&self, camera: &Camera, image: &ImageSettings, render: &RenderSettings) -> View {
+        let (right, up, forward) = camera.axes();
+        View {
+            eye: camera.eye - self.origin,
+            right,
+            up,
+            forward,
+            lens: camera.lens,
+            width: f64::from(image.width),
+            height: f64::from(image.height),
+            filter: FilterTable::new(image.filter),
+            seed: render.seed,
+            spp: image.spp.max(1),
+            max_depth: render.max_depth,
+        }
+    }
+}
+
+impl View {
+    /// The point of the picture, in pixels, that a sample of a pixel looks through.
+    pub fn point(&self, x: i32, y: i32, sample: u32) -> (f64, f64) {
+        let (center_x, center_y) = (f64::from(x) + 0.5, f64::from(y) + 0.5);
+        if self.spp == 1 {
+            return (center_x, center_y);
+        }
+        let key = sample::pixel_key(self.seed, x, y);
+        let [a, b] = sample::pair(key, sample, sample::dimension::FILTER).map(sample::unit);
+        (center_x + self.filter.offset(a), center_y + self.filter.offset(b))
+    }
+
+    /// The ray through a point of the picture, in pixels from its upper left corner.
+    pub fn ray(&self, x: f64, y: f64) -> Ray {
+        let across = (2.0 * x - self.width) / self.height;
+        let upward = (self.height - 2.0 * y) / self.height;
+        let shift = across * self.right + upward * self.up;
+        let (origin, dir) = match self.lens {
+            Lens::Pinhole { vfov } => (self.eye, self.forward + (0.5 * vfov.to_radians()).tan() * shift),
+            Lens::Orthographic { height } => (self.eye + 0.5 * height * shift, self.forward),
+        };
+        Ray { origin, dir, t_min: 0.0, t_max: f64::INFINITY }
+    }
+}
