@@ -1,5 +1,6 @@
 //! octray: a batch renderer and ray-tracing library for analytic primitives.
 #![forbid(unsafe_code)]
 
+pub mod film;
 pub mod sample;
 pub mod scene;

@@ -1,0 +1,147 @@
+//! A finished picture and the window that it covers.
+
+/// A rectangle of pixels, half open: `x0 <= x < x1`, `y0 <= y < y1`; x right, y down, the first pixel
+/// of the display window at (0, 0). Empty where `x1 <= x0` or `y1 <= y0`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Window {
+    /// Left edge, inside.
+    pub x0: i32,
+    /// Upper edge, inside.
+    pub y0: i32,
+    /// Right edge, outside.
+    pub x1: i32,
+    /// Lower edge, outside.
+    pub y1: i32,
+}
+
+impl Window {
+    /// The whole of a display window of this size (width, height).
+    pub fn full(display: (u32, u32)) -> Self {
+        let edge = |size: u32| i32::try_from(size).unwrap_or(i32::MAX);
+        Window { x0: 0, y0: 0, x1: edge(display.0), y1: edge(display.1) }
+    }
+
+    /// Pixels from left to right.
+    pub fn width(&self) -> usize {
+        extent(self.x0, self.x1)
+    }
+
+    /// Pixels from top to bottom.
+    pub fn height(&self) -> usize {
+        extent(self.y0, self.y1)
+    }
+
+    /// All pixels.
+    pub fn area(&self) -> usize {
+        self.width().saturating_mul(self.height())
+    }
+
+    /// The place of a pixel in a row-by-row list of the window's pixels, or `None` outside.
+    #[inline]
+    pub fn index(&self, x: i32, y: i32) -> Option<usize> {
+        let inside = (self.x0..self.x1).contains(&x) && (self.y0..self.y1).contains(&y);
+        inside.then(|| extent(self.y0, y) * self.width() + extent(self.x0, x))
+    }
+
+    /// The pixel (x, y) at a place of that list: the inverse of [`Window::index`] for places within the window.
+    #[inline]
+    pub fn pixel(&self, index: usize) -> (i32, i32) {
+        let width = self.width().max(1);
+        (self.x0.wrapping_add((index % width) as i32), self.y0.wrapping_add((index / width) as i32))
+    }
+
+    /// Whether every pixel of `other` lies inside.
+    pub fn holds(&self, other: &Window) -> bool {
+        self.x0 <= other.x0 && self.y0 <= other.y0 && other.x1 <= self.x1 && other.y1 <= self.y1
+    }
+}
+
+/// "4x3 at 10,20": width, height and the first pixel.
+impl std::fmt::Display for Window {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}x{} at {},{}", self.width(), self.height(), self.x0, self.y0)
+    }
+}
+
+fn extent(from: i32, to: i32) -> usize {
+    usize::try_from(i64::from(to) - i64::from(from)).unwrap_or(0)
+}
+
+/// A finished picture: scene-linear Rec. 709 with premultiplied alpha.
+///
+/// A writer refuses a picture whose list of pixels is not as long as its window is large.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    /// Width and height of the full frame, in pixels: the display window, whose first pixel is (0, 0).
+    pub display: (u32, u32),
+    /// The pixels that are present: the data window. A crop lies inside the display window, an
+    /// overscan reaches beyond it.
+    pub window: Window,
+    /// Red, green, blue, alpha of each pixel of the window, row by row from the top. Radiance has no
+    /// upper bound, alpha is in 0..1, colour is already multiplied by alpha.
+    pub pixels: Vec<[f32; 4]>,
+}
+
+impl Picture {
+    /// A picture of transparent black.
+    pub fn new(display: (u32, u32), window: Window) -> Self {
+        Picture { display, window, pixels: vec![[0.0; 4]; window.area()] }
+    }
+
+    /// The pixel at (x, y) of the display window, or `None` where the picture has none.
+    pub fn get(&self, x: i32, y: i32) -> Option<[f32; 4]> {
+        self.window.index(x, y).and_then(|index| self.pixels.get(index)).copied()
+    }
+
+    /// Whether there is a pixel at all, and one for each place of the window.
+    pub fn is_whole(&self) -> bool {
+        !self.pixels.is_empty() && self.pixels.len() == self.window.area()
+    }
+
+    /// The part of the picture that lies in `window`; the frame stays the same. `None` where the
+    /// window is empty or reaches beyond the picture's own.
+    pub fn crop(&self, window: Window) -> Option<Picture> {
+        if window.area() == 0 || !self.window.holds(&window) || !self.is_whole() {
+            return None;
+        }
+        let row = |y| self.window.index(window.x0, y).map(|start| &self.pixels[start..start + window.width()]);
+        let pixels = (window.y0..window.y1).filter_map(row).flatten().copied().collect();
+        Some(Picture { display: self.display, window, pixels })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn index_and_pixel_are_inverse() {
+        let window = Window { x0: -2, y0: 3, x1: 5, y1: 9 };
+        assert_eq!((window.width(), window.height(), window.area()), (7, 6, 42));
+        for index in 0..window.area() {
+            let (x, y) = window.pixel(index);
+            assert_eq!(window.index(x, y), Some(index));
+        }
+        assert_eq!(window.index(5, 3), None);
+        assert_eq!(window.index(-2, 9), None);
+        assert_eq!(Window { x0: 3, y0: 0, x1: -1, y1: 4 }.area(), 0);
+    }
+
+    #[test]
+    fn crop_keeps_each_pixel_in_its_place() {
+        let mut picture = Picture::new((6, 4), Window::full((6, 4)));
+        for (index, pixel) in picture.pixels.iter_mut().enumerate() {
+            pixel[0] = index as f32;
+        }
+        let window = Window { x0: 2, y0: 1, x1: 5, y1: 3 };
+        let part = picture.crop(window).expect("inside");
+        assert_eq!(part.display, (6, 4));
+        for index in 0..window.area() {
+            let (x, y) = window.pixel(index);
+            assert_eq!(part.get(x, y), picture.get(x, y), "{x} {y}");
+        }
+        assert_eq!(part.get(1, 1), None);
+        assert_eq!(picture.crop(Window { x0: 2, y0: 1, x1: 7, y1: 3 }), None);
+        assert_eq!(picture.crop(Window { x0: 2, y0: 1, x1: 2, y1: 3 }), None);
+    }
+}
