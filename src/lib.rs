@@ -2,5 +2,6 @@
 #![forbid(unsafe_code)]
 
 pub mod film;
+pub mod output;
 pub mod sample;
 pub mod scene;
