@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 pub mod film;
+pub mod measure;
 pub mod output;
 pub mod sample;
 pub mod scene;
