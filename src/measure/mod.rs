@@ -1,7 +1,7 @@
 //! Measuring: how far apart two pictures are.
 //!
-//! This room answers for [`metrics`] (numbers), [`ssim`] (one of them, with an algorithm of its own) and
-//! [`heatmap`] (a picture of the differences). It reads and judges; it renders nothing.
+//! This room answers for [`metrics`] (numbers), `ssim` (one of them, with an algorithm of its own) and
+//! [`mod@heatmap`] (a picture of the differences). It reads and judges; it renders nothing.
 
 mod canvas;
 pub mod heatmap;

@@ -303,8 +303,11 @@ mod tests {
         let empty = Picture::new((4, 4), Window { x0: 2, y0: 2, x1: 2, y1: 4 });
         let mut short = picture();
         short.pixels.pop();
+        let one = Window::full((1, 1));
         let far = Window { x0: i32::MAX - 1, y0: 0, x1: i32::MAX, y1: 1 };
-        for picture in [empty, short, Picture::new((4, 4), far), Picture::new((0, 0), Window::full((1, 1)))] {
+        for picture in
+            [empty, short, Picture::new((4, 4), far), Picture::new((0, 0), one), Picture::new((u32::MAX, 1), one)]
+        {
             assert!(encode(&picture, false, &described()).is_err(), "{:?}", picture.window);
         }
     }

@@ -1,7 +1,7 @@
 //! Pictures in and out of files.
 //!
 //! This room answers for what a file holds, byte by byte: [`exr`] and [`png`] encode a picture,
-//! [`aside`] puts bytes under a name without ever leaving half a file there, [`read`] brings a file
+//! [`aside`] puts bytes under a name without ever leaving half a file there, [`mod@read`] brings a file
 //! back as a picture, [`description`] says where a picture comes from, [`srgb`] is the display curve.
 //! What the pixels mean is settled before: scene-linear, premultiplied ([`Picture`]).
 
