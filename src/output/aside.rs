@@ -40,11 +40,11 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     }
 }
 
-/// Finds out, before hours of work, whether a file of this name could be written: same errors as [`write`],
+/// Finds out, before hours of work, whether a file of this name could be written: same errors as [`write()`],
 /// nothing is left behind.
 ///
 /// # Errors
-/// As [`write`], except a disk that is full later on.
+/// As [`write()`], except a disk that is full later on.
 pub fn check(path: &Path) -> Result<(), OutputError> {
     let io = |source| OutputError::Io { path: path.into(), source };
     match target(path)? {
