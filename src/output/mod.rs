@@ -1,0 +1,142 @@
+//! Pictures in and out of files.
+//!
+//! This room answers for what a file holds, byte by byte: [`exr`] and [`png`] encode a picture,
+//! [`aside`] puts bytes under a name without ever leaving half a file there, [`mod@read`] brings a file
+//! back as a picture, [`description`] says where a picture comes from, [`srgb`] is the display curve.
+//! What the pixels mean is settled before: scene-linear, premultiplied ([`Picture`]).
+
+pub mod aside;
+pub mod description;
+pub mod exr;
+pub mod png;
+pub mod read;
+pub mod srgb;
+mod view;
+
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+pub use self::description::{Description, Run};
+pub use self::png::Bits;
+pub use self::read::{ReadError, read};
+use crate::film::Picture;
+
+/// The kinds of file that a picture can become.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// OpenEXR: scene-linear, with all that is known of the picture.
+    Exr,
+    /// PNG: what a display shows.
+    Png,
+}
+
+impl Format {
+    /// By the extension of a name, upper or lower case; `None` for any other.
+    pub fn of(path: &Path) -> Option<Format> {
+        let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+        match extension.as_str() {
+            "exr" => Some(Format::Exr),
+            "png" => Some(Format::Png),
+            _ => None,
+        }
+    }
+}
+
+/// How samples are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Options {
+    /// EXR: 32-bit floats instead of halves.
+    pub float: bool,
+    /// PNG: bits per sample.
+    pub bits: Bits,
+}
+
+/// Samples that a file could not hold as they were.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Losses {
+    /// Samples beyond the largest half (EXR), or outside 0..1 (PNG), stored as the nearest bound.
+    pub clamped: u64,
+    /// Samples that were NaN or infinite, stored as 0.
+    pub dropped: u64,
+}
+
+/// A picture that could not be written. Nothing is left behind under its name, or what was there before.
+#[derive(Debug, Error)]
+pub enum OutputError {
+    /// The name says no known format.
+    #[error("{}: unknown kind of picture: the name should end in .exr or .png", path.display())]
+    Format {
+        /// The output name.
+        path: PathBuf,
+    },
+    /// The name belongs to a directory, or names no file at all.
+    #[error("{}: is a directory: the output should be a file name", path.display())]
+    Directory {
+        /// The output name.
+        path: PathBuf,
+    },
+    /// The directory of the name is not there.
+    #[error("{}: cannot be written: there is no directory {}", path.display(), directory.display())]
+    NoDirectory {
+        /// The output name.
+        path: PathBuf,
+        /// What is missing.
+        directory: PathBuf,
+    },
+    /// The system refused: no permission, no space, a broken disk.
+    #[error("{}: cannot be written: {source}", path.display())]
+    Io {
+        /// The output name.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The picture does not fit the format, or is not whole.
+    #[error("{}: cannot be encoded: {reason}", path.display())]
+    Encode {
+        /// The output name.
+        path: PathBuf,
+        /// What does not fit.
+        reason: String,
+    },
+}
+
+/// Writes a picture in the format that the name says, so that the name stands for a whole file or is left as it was.
+///
+/// # Errors
+/// Any [`OutputError`]; each names the path and the cause.
+pub fn write(
+    path: &Path,
+    picture: &Picture,
+    options: Options,
+    description: &Description,
+) -> Result<Losses, OutputError> {
+    let encoded = match Format::of(path) {
+        Some(Format::Exr) => exr::encode(picture, options.float, description),
+        Some(Format::Png) => png::encode(picture, options.bits, description),
+        None => return Err(OutputError::Format { path: path.into() }),
+    };
+    let (bytes, losses) = encoded.map_err(|reason| OutputError::Encode { path: path.into(), reason: reason.0 })?;
+    aside::write(path, &bytes)?;
+    Ok(losses)
+}
+
+/// Why a picture cannot be encoded: it is not whole, or too large for the format.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("{0}")]
+pub struct EncodeError(pub String);
+
+impl EncodeError {
+    fn new(reason: impl ToString) -> Self {
+        EncodeError(reason.to_string())
+    }
+
+    /// Refuses a picture whose list of pixels does not fill its window.
+    fn unless_whole(picture: &Picture) -> Result<(), EncodeError> {
+        if picture.is_whole() {
+            return Ok(());
+        }
+        Err(EncodeError(format!("{} pixels for a window of {}", picture.pixels.len(), picture.window)))
+    }
+}
