@@ -48,9 +48,10 @@ impl Polygon {
     /// windings of neighbours add up to that of their union to the last bit: no line slips through
     /// between two polygons that share an edge, whatever the rounding.
     ///
-    /// Source of the count: Alciatore and Miranda, "A winding number and point-in-polygon algorithm",
-    /// 1995; of the antisymmetric product (a + b) x (b - a): Platis and Theoharis, "Fast ray-tetrahedron
-    /// intersection using Plücker coordinates", Journal of Graphics Tools 8(4), 2003.
+    /// The hand is the sign of d . (a x b), the side product of Plücker coordinates, written with
+    /// (a + b) x (b - a) = 2 a x b: this keeps its sign symmetric, and its error is that of one
+    /// distance times the edge instead of two distances. Source of the count: Alciatore and Miranda,
+    /// "A winding number and point-in-polygon algorithm", Colorado State University, 1995.
     fn surrounds(&self, line: &Line) -> bool {
         let (o, d) = (line.origin, line.dir);
         let side_normal = perpendicular(d);
