@@ -19,7 +19,8 @@ pub struct Polygon {
 impl Polygon {
     pub fn new(polygon: &scene::Polygon, origin: DVec3) -> Polygon {
         let corners: Vec<DVec3> = polygon.corners.iter().map(|corner| *corner - origin).collect();
-        let (point, normal) = (corners[0], polygon.normal());
+        // A polygon without corners is no valid one; with a normal of zero it is never met.
+        let (point, normal) = corners.first().map_or_else(Default::default, |first| (*first, polygon.normal()));
         let warp = corners.iter().map(|corner| normal.dot(*corner - point).abs()).fold(0.0, f64::max);
         let plane = Plane { point, normal, warp };
         Polygon { plane, corners, uvs: polygon.uvs.clone(), normals: polygon.normals.clone() }
