@@ -9,6 +9,7 @@
 mod background;
 mod camera;
 mod cloud;
+pub mod error;
 mod image;
 mod light;
 mod material;
@@ -22,6 +23,7 @@ use glam::DVec3;
 pub use self::background::{Backdrop, Background};
 pub use self::camera::{Camera, Lens};
 pub use self::cloud::{Cloud, CloudMaterial, CloudShapes, Rows};
+pub use self::error::{Place, SceneError, SceneErrors, Warning};
 pub use self::image::{Filter, FilterKind, FilterTable, ImageSettings, Integrator, RenderSettings};
 pub use self::light::{Falloff, Light, Source};
 pub use self::material::{Material, Model, Paint, Visible};
@@ -56,6 +58,8 @@ pub struct Scene {
     pub clouds: Vec<Cloud>,
     /// Names of the groups; an object or cloud refers to one by index.
     pub groups: Vec<String>,
+    /// What the reader mended or left out.
+    pub warnings: Vec<Warning>,
 }
 
 /// One shape with its material: a primitive of its own.
