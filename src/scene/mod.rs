@@ -13,6 +13,7 @@ pub mod error;
 mod image;
 mod light;
 mod material;
+pub mod rules;
 mod shape;
 mod texture;
 
