@@ -685,7 +685,7 @@ proptest! {
 
     #[test]
     fn any_change_of_an_array_or_picture_is_read_or_refused(
-        file in prop::sample::select(&FILES[..]),
+        file in prop::sample::select(FILES),
         edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
         cut in prop::option::of(any::<prop::sample::Index>()),
     ) {
