@@ -6,12 +6,12 @@
 use glam::DVec3;
 
 use super::record::{RayCounts, RayKind, Record};
-use super::wave::{Branch, Wave, lanes};
+use super::wave::{Branch, ExactRays, Wave, lanes};
 use crate::accel::{PACKETS, Tile, Tree, Walk};
 use crate::lanes::{Float8, LANES, Mask8, Ray, RayPacket, UNIT_ROUNDOFF, Vec3x8, float8};
 use crate::plan::{Owner, Plan};
-use crate::shade::{Backdrop8, Bsdf8, Illumination, LightTable, MaterialTable, Toward, attributes};
-use crate::shapes::RowRef;
+use crate::shade::{Backdrop8, Bsdf8, Facing, Illumination, LightTable, MaterialTable, Toward, attributes};
+use crate::shapes::{Ray64, RowRef, Surface8};
 
 /// All that is needed to find the radiance along rays.
 #[derive(Debug)]
@@ -60,6 +60,23 @@ struct Shaded {
     /// Lanes whose shading normal is interpolated.
     smooth: Mask8,
     bsdf: Bsdf8,
+    /// In f64, where rays may go on.
+    exact: Option<[Exact; LANES]>,
+}
+
+/// One hit in f64, as rays go on from it.
+#[derive(Clone, Copy)]
+struct Exact {
+    point: DVec3,
+    facing: Facing,
+    material: u32,
+}
+
+impl Default for Exact {
+    fn default() -> Self {
+        let facing = Facing { dir: DVec3::NEG_Z, n_s: DVec3::Z, n_g: DVec3::Z, front: true };
+        Exact { point: DVec3::ZERO, facing, material: 0 }
+    }
 }
 
 impl<'s> Direct<'s> {
@@ -77,10 +94,23 @@ impl<'s> Direct<'s> {
         }
     }
 
+    /// Whether rays go on from some material, so that rays are to be given in f64 as well.
+    pub fn scatters(&self) -> bool {
+        self.plan.scatters
+    }
+
     /// Radiance along the camera rays of a tile.
-    pub fn radiance<R: Record>(&self, tile: Tile, room: &mut Room, record: &mut R) -> Samples {
+    ///
+    /// Where [`Direct::scatters`], `exact` holds the same rays before they were rounded.
+    pub fn radiance<R: Record>(
+        &self,
+        tile: Tile,
+        exact: Option<Box<ExactRays>>,
+        room: &mut Room,
+        record: &mut R,
+    ) -> Samples {
         let mut samples = Samples { radiance: [Vec3x8::ZERO; PACKETS], alpha: [Float8::ZERO; PACKETS] };
-        self.trace(Wave::camera(tile), &mut samples, room, record);
+        self.trace(Wave::camera(tile, exact), &mut samples, room, record);
         samples
     }
 
@@ -109,7 +139,7 @@ impl<'s> Direct<'s> {
         for (index, light) in self.lights.iter().enumerate() {
             self.add_light(index, light, &wave, &shaded, samples, room, record);
         }
-        if wave.depth < self.max_depth {
+        if wave.depth < self.max_depth && self.plan.scatters {
             let (reflected, refracted) = self.branches(&wave, &shaded);
             for (kind, branches) in [(RayKind::Reflection, reflected), (RayKind::Refraction, refracted)] {
                 for chunk in branches.chunks(PACKETS * LANES) {
@@ -145,7 +175,8 @@ impl<'s> Direct<'s> {
     fn shade<R: Record>(&self, wave: &Wave, p: usize, hit: u32, record: &mut R) -> Shaded {
         let (rays, stores) = (&wave.tile.packets[p], self.tree.stores());
         let rows: [RowRef; LANES] = std::array::from_fn(|i| wave.tile.hit(p, i));
-        let surface = stores.surface(wave.tile.hits[p], rays, rays.t_max);
+        let mut surface = stores.surface(wave.tile.hits[p], rays, rays.t_max);
+        let exact = self.refine(wave, p, hit, &mut surface);
         let front = Mask8::sign(surface.normal.dot(rays.dir));
         let n_g = Vec3x8::select(front, surface.normal, -surface.normal);
         let any = hit.trailing_zeros() as usize;
@@ -167,7 +198,11 @@ impl<'s> Direct<'s> {
             n_s: n_g,
             smooth: Mask8::NONE,
             bsdf: self.materials.gather(materials),
+            exact,
         };
+        if let Some(exact) = &mut shaded.exact {
+            lanes(hit).for_each(|i| exact[i].material = materials[i]);
+        }
         self.add_textures(wave, p, &rows, &owners, &materials, &mut shaded, record);
         self.add_normals(&owners, &mut shaded);
         shaded
@@ -220,6 +255,9 @@ impl<'s> Direct<'s> {
             if let Some(normal) = attributes::shading_normal(self.plan, owners[i], point) {
                 let turned = if fronts >> i & 1 == 1 { normal } else { -normal };
                 (normals[i], smooth) = (turned.as_vec3().to_array(), smooth | 1 << i);
+                if let Some(exact) = &mut shaded.exact {
+                    exact[i].facing.n_s = turned;
+                }
             }
         }
         shaded.n_s = Vec3x8::from_fn(|i| normals[i]);
@@ -303,45 +341,63 @@ impl<'s> Direct<'s> {
     fn branches(&self, wave: &Wave, shaded: &[Option<Shaded>; PACKETS]) -> (Vec<Branch>, Vec<Branch>) {
         let (mut reflected, mut refracted) = (Vec::new(), Vec::new());
         for (p, shaded) in shaded.iter().enumerate() {
-            let Some(shaded) = shaded else { continue };
-            let (reflects, refracts) = shaded.scatters();
-            if reflects | refracts == 0 {
+            let Some((shaded, exact)) = shaded.as_ref().and_then(|shaded| Some((shaded, shaded.exact.as_ref()?)))
+            else {
                 continue;
-            }
-            let scattered = shaded.scatter();
-            let push = |list: &mut Vec<Branch>, mask: u32, (dir, share): (Vec3x8, Vec3x8), out: bool| {
-                let weight = share.scale(wave.weight[p]);
-                let carries = Mask8::gt(weight.x + weight.y + weight.z, Float8::ZERO).bits();
-                let mask = if self.skip { mask & carries } else { mask };
-                let origin = shaded.leave(out, shaded.error).to_arrays();
-                let (dirs, weights) = (dir.to_arrays(), weight.to_arrays());
-                for i in lanes(mask) {
-                    let path = wave.paths[p][i].wrapping_mul(2) + u32::from(!out);
-                    let slot = wave.slot(p, i) as u8;
-                    list.push(Branch { origin: origin[i], dir: dirs[i], weight: weights[i], slot, path });
-                }
             };
-            push(&mut reflected, reflects, scattered.reflected, true);
-            push(&mut refracted, refracts & !scattered.total.bits(), scattered.refracted, false);
+            let origins = [shaded.leave(false, shaded.error), shaded.leave(true, shaded.error)].map(Vec3x8::to_arrays);
+            let (colors, weights) = (shaded.bsdf.color.to_arrays(), wave.weight[p].to_arrays());
+            for i in lanes(shaded.hit) {
+                let color = DVec3::from_array(colors[i].map(f64::from));
+                let Exact { point, facing, material } = &exact[i];
+                let (mirrored, through) = self.materials.onward(*material).ways(color, facing);
+                let path = wave.paths[p][i].wrapping_mul(2);
+                for (list, way, path) in [(&mut reflected, mirrored, path), (&mut refracted, through, path + 1)] {
+                    let Some((dir, share)) = way else { continue };
+                    let share = share.as_vec3().to_array();
+                    let weight: [f32; 3] = std::array::from_fn(|k| share[k] * weights[i][k]);
+                    if self.skip && weight == [0.0; 3] {
+                        continue;
+                    }
+                    let origin = origins[usize::from(dir.dot(facing.n_g) > 0.0)][i];
+                    let slot = wave.slot(p, i) as u8;
+                    list.push(Branch { origin, exact: (*point, dir), weight, slot, path });
+                }
+            }
         }
         (reflected, refracted)
     }
-}
 
-/// Where light goes on, and how much of it.
-struct Scattered {
-    reflected: (Vec3x8, Vec3x8),
-    refracted: (Vec3x8, Vec3x8),
-    /// Lanes whose reflection is total.
-    total: Mask8,
+    /// The hits of a packet again in f64, rounded into `surface`.
+    fn refine(&self, wave: &Wave, p: usize, hit: u32, surface: &mut Surface8) -> Option<[Exact; LANES]> {
+        let rays = &wave.exact.as_ref()?[p];
+        let t = wave.tile.packets[p].t_max.to_array();
+        let (mut points, mut normals) = (surface.point.to_arrays(), surface.normal.to_arrays());
+        let mut exact = [Exact::default(); LANES];
+        for i in lanes(hit) {
+            let (origin, dir) = rays[i];
+            let ray = Ray64 { origin, dir, t_min: 0.0, t_max: f64::INFINITY };
+            let found = self.tree.stores().refine(wave.tile.hit(p, i), &ray, f64::from(t[i]))?;
+            (points[i], normals[i]) = (found.point.as_vec3().to_array(), found.normal.as_vec3().to_array());
+            let front = found.normal.dot(dir) < 0.0;
+            let n_g = if front { found.normal } else { -found.normal };
+            let facing = Facing { dir: dir.normalize(), n_s: n_g, n_g, front };
+            exact[i] = Exact { point: found.point, facing, material: 0 };
+        }
+        surface.point = Vec3x8::from_fn(|i| points[i]);
+        surface.normal = Vec3x8::from_fn(|i| normals[i]);
+        Some(exact)
+    }
 }
 
 impl Shaded {
-    /// What one light gives without regard to shadows, and the lanes that face it.
+    /// What one light gives without regard to shadows, and the lanes that face it where it gives anything.
     #[inline(always)]
     fn share(&self, wi: Vec3x8, strength: Vec3x8) -> (Vec3x8, Mask8) {
         let (cos, cos_g) = (self.n_s.dot(wi), self.n_g.dot(wi));
-        let facing = Mask8::gt(cos, Float8::ZERO) & Mask8::gt(cos_g, Float8::ZERO);
+        let zero = Float8::ZERO;
+        let facing = Mask8::gt(cos, zero) & Mask8::gt(cos_g, zero) & Mask8::gt(self.bsdf.lit, zero);
+        let facing = facing & Mask8::gt(strength.x + strength.y + strength.z, zero);
         let mut diffuse = cos;
         if self.smooth.any() {
             diffuse = self.smooth.select(cos * self.terminator(cos, cos_g), cos);
@@ -356,7 +412,7 @@ impl Shaded {
     /// Source: Chiang, Li and Burley, "Taming the shadow terminator", SIGGRAPH 2019 talks.
     fn terminator(&self, cos: Float8, cos_g: Float8) -> Float8 {
         let one = float8(1.0);
-        let x = (cos_g / (cos * self.n_s.dot(self.n_g))).fast_min(one);
+        let x = (cos_g / (cos * self.n_s.dot(self.n_g))).fast_min(one).fast_max(Float8::ZERO);
         x * (one + x * (one - x))
     }
 
@@ -387,38 +443,6 @@ impl Shaded {
                 RayPacket::new(position, dir, float8(1.0 - 8.0 * UNIT_ROUNDOFF), live)
             }
         }
-    }
-
-    /// Lanes that reflect, and lanes that refract.
-    #[inline(always)]
-    fn scatters(&self) -> (u32, u32) {
-        let positive = |x: Float8| Mask8::gt(x, Float8::ZERO).bits();
-        let through = positive(self.bsdf.dielectric + self.bsdf.transmittance) & self.hit;
-        (through | (positive(self.bsdf.mirror + self.bsdf.specular) & self.hit), through)
-    }
-
-    fn scatter(&self) -> Scattered {
-        let (one, n) = (float8(1.0), self.n_s);
-        let cos_i = n.dot(self.wo).fast_max(Float8::ZERO);
-        let ratio = self.front.select(one / self.bsdf.ior, self.bsdf.ior);
-        let sin2_t = ratio * ratio * (one - cos_i * cos_i).fast_max(Float8::ZERO);
-        let total = Mask8::ge(sin2_t, one);
-        let cos_t = (one - sin2_t).fast_max(Float8::ZERO).sqrt();
-        let (reflected, refracted) = self.bsdf.scatter(cos_i, cos_t, ratio, total);
-        let through = n.mul_add(ratio * cos_i - cos_t, -(self.wo * ratio));
-        Scattered { reflected: (self.mirrored(), reflected), refracted: (through, refracted), total }
-    }
-
-    /// The mirror direction, bent back where an interpolated normal sends it below the surface.
-    fn mirrored(&self) -> Vec3x8 {
-        let cos = self.n_s.dot(self.wo);
-        let mirrored = self.n_s.mul_add(cos + cos, -self.wo);
-        let below = self.smooth & Mask8::le(mirrored.dot(self.n_g), Float8::ZERO);
-        if !below.any() {
-            return mirrored;
-        }
-        let lift = float8(1e-3) - mirrored.dot(self.n_g);
-        Vec3x8::select(below, self.n_g.mul_add(lift, mirrored), mirrored)
     }
 }
 

@@ -8,3 +8,4 @@ mod wave;
 pub use self::camera::CameraRays;
 pub use self::direct::{Direct, Room, Samples};
 pub use self::record::{RayCounts, RayKind, Record, Silent};
+pub use self::wave::ExactRays;
