@@ -1,7 +1,10 @@
 //! From rays to radiance, a tile at a time.
 
+mod branches;
 mod camera;
 mod direct;
+mod hits;
+mod lights;
 mod record;
 mod wave;
 
