@@ -9,7 +9,7 @@ use glam::DVec3;
 pub use self::parts::{
     BoxPart, ConePart, CylinderPart, DiskPart, Kind, Owner, Parts, PlanePart, PolygonPart, SpherePart, TurnedBoxPart,
 };
-use crate::scene::{Material, Object, Scene, Shape, Visible};
+use crate::scene::{CloudMaterial, Material, Object, Scene, Shape, Visible};
 
 /// Decisions about one scene seen from one origin.
 #[derive(Debug)]
@@ -29,6 +29,21 @@ pub struct Plan<'s> {
     pub scatters: bool,
 }
 
+/// Materials that some primitive shows, their backs among them.
+fn used_materials(scene: &Scene) -> Vec<usize> {
+    let mut used = vec![false; scene.materials.len()];
+    scene.objects.iter().for_each(|object| used[object.material] = true);
+    for cloud in &scene.clouds {
+        match &cloud.material {
+            CloudMaterial::One(material) => used[*material] = true,
+            CloudMaterial::Each(materials) => materials.iter().for_each(|material| used[*material as usize] = true),
+        }
+    }
+    let backs: Vec<usize> = (0..used.len()).filter(|i| used[*i]).filter_map(|i| scene.materials[i].back).collect();
+    backs.into_iter().for_each(|back| used[back] = true);
+    (0..used.len()).filter(|i| used[*i]).collect()
+}
+
 impl<'s> Plan<'s> {
     /// Plans for rays that are given relative to `origin`.
     pub fn new(scene: &'s Scene, origin: DVec3) -> Self {
@@ -39,7 +54,7 @@ impl<'s> Plan<'s> {
             _ => false,
         };
         let smooth = scene.objects.iter().any(has_normals);
-        let scatters = scene.materials.iter().any(|material| material.model.scatters());
+        let scatters = used_materials(scene).iter().any(|index| scene.materials[*index].model.scatters());
         Plan { scene, origin, visible, colored, smooth, scatters }
     }
 
