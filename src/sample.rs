@@ -35,6 +35,16 @@ pub fn pair(pixel_key: u32, index: u32, dimension: u32) -> [u32; 2] {
     [x, y]
 }
 
+/// [`pair`] for eight samples at once: first coordinates, second coordinates.
+#[inline]
+pub fn pairs(pixel_keys: &[u32; 8], indices: &[u32; 8], dimension: u32) -> [[u32; 8]; 2] {
+    let (mut first, mut second) = ([0; 8], [0; 8]);
+    for lane in 0..8 {
+        [first[lane], second[lane]] = pair(pixel_keys[lane], indices[lane], dimension);
+    }
+    [first, second]
+}
+
 /// Bits as the number they stand for, in the open interval 0..1.
 #[inline]
 pub fn unit(bits: u32) -> f64 {

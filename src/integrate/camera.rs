@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::lanes::{LANES, Mask8, RayPacket, Vec3x8, float8};
+use crate::lanes::{Float8, LANES, Mask8, RayPacket, Vec3x8, float8};
 use crate::sample::{self, dimension};
 use crate::scene::{Camera, Filter, FilterTable, Lens};
 
@@ -49,34 +49,93 @@ impl CameraRays {
         sample::pixel_key(self.seed, x, y)
     }
 
-    /// Eight rays in f64: pixel, its key and sample index by lane.
+    /// Eight rays in f64.
     #[inline(always)]
-    pub fn exact(&self, samples: &[(i32, i32, u32, u32); LANES]) -> [(DVec3, DVec3); LANES] {
-        samples.map(|(x, y, key, index)| {
-            let (x, y) = self.point(x, y, key, index);
-            let at = |base: &[DVec3; 3]| base[0] + base[1] * x + base[2] * y;
-            (at(&self.origin), at(&self.dir))
-        })
+    pub fn exact(&self, samples: &Samples8) -> ExactPacket {
+        let points = self.points(samples);
+        let at = |base: &[DVec3; 3], k: usize| {
+            let mut axis = [0.0; LANES];
+            for lane in 0..LANES {
+                axis[lane] = base[0][k] + base[1][k] * points[0][lane] + base[2][k] * points[1][lane];
+            }
+            axis
+        };
+        ExactPacket { origin: [0, 1, 2].map(|k| at(&self.origin, k)), dir: [0, 1, 2].map(|k| at(&self.dir, k)) }
     }
 
     /// The same rounded; lanes from `count` on are dead.
     #[inline(always)]
-    pub fn packet(&self, exact: &[(DVec3, DVec3); LANES], count: usize) -> RayPacket {
+    pub fn packet(&self, exact: &ExactPacket, count: usize) -> RayPacket {
         let live = Mask8::from_bits((1u32 << count) - 1);
         let origin = match self.common_origin() {
             Some(origin) => Vec3x8::splat(origin),
-            None => Vec3x8::from_fn(|i| exact[i].0.as_vec3().to_array()),
+            None => rounded(&exact.origin),
         };
-        RayPacket::new(origin, Vec3x8::from_fn(|i| exact[i].1.as_vec3().to_array()), float8(f32::INFINITY), live)
+        RayPacket::new(origin, rounded(&exact.dir), float8(f32::INFINITY), live)
     }
 
+    /// Points of the picture in pixels: x, y.
     #[inline(always)]
-    fn point(&self, x: i32, y: i32, key: u32, index: u32) -> (f64, f64) {
-        let center = (f64::from(x) + 0.5, f64::from(y) + 0.5);
+    fn points(&self, samples: &Samples8) -> [[f64; LANES]; 2] {
+        let mut points = [samples.x, samples.y].map(|axis| axis.map(|pixel| f64::from(pixel) + 0.5));
         if self.centered {
-            return center;
+            return points;
         }
-        let [a, b] = sample::pair(key, index, dimension::FILTER).map(sample::unit);
-        (center.0 + self.filter.offset(a), center.1 + self.filter.offset(b))
+        let bits = sample::pairs(&samples.key, &samples.index, dimension::FILTER);
+        for (axis, bits) in points.iter_mut().zip(bits) {
+            for lane in 0..LANES {
+                axis[lane] += self.filter.offset(sample::unit(bits[lane]));
+            }
+        }
+        points
     }
+}
+
+/// Eight samples of pixels.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Samples8 {
+    /// Columns of the pixels.
+    pub x: [i32; LANES],
+    /// Rows of the pixels.
+    pub y: [i32; LANES],
+    /// Names of the pixels' sample patterns.
+    pub key: [u32; LANES],
+    /// Indices of the samples.
+    pub index: [u32; LANES],
+}
+
+/// Origins and directions of eight rays in f64, by axis.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ExactPacket {
+    /// Scene units, relative to the plan's origin.
+    pub origin: [[f64; LANES]; 3],
+    /// Any length.
+    pub dir: [[f64; LANES]; 3],
+}
+
+impl ExactPacket {
+    /// Origin and direction of one ray.
+    pub fn lane(&self, i: usize) -> (DVec3, DVec3) {
+        let at = |axes: &[[f64; LANES]; 3]| DVec3::new(axes[0][i], axes[1][i], axes[2][i]);
+        (at(&self.origin), at(&self.dir))
+    }
+
+    /// Sets one ray.
+    pub fn set_lane(&mut self, i: usize, origin: DVec3, dir: DVec3) {
+        for k in 0..3 {
+            (self.origin[k][i], self.dir[k][i]) = (origin[k], dir[k]);
+        }
+    }
+}
+
+#[inline(always)]
+fn rounded(axes: &[[f64; LANES]; 3]) -> Vec3x8 {
+    let axis = |k: usize| {
+        let mut lanes = [0.0; LANES];
+        for i in 0..LANES {
+            lanes[i] = axes[k][i] as f32;
+        }
+        Float8::from(lanes)
+    };
+    Vec3x8::new(axis(0), axis(1), axis(2))
 }

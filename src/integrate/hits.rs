@@ -143,7 +143,7 @@ impl Direct<'_> {
         let (mut points, mut normals) = (surface.point.to_arrays(), surface.normal.to_arrays());
         let mut exact = [Exact::default(); LANES];
         for i in lanes(hit) {
-            let (origin, dir) = rays[i];
+            let (origin, dir) = rays.lane(i);
             let ray = Ray64 { origin, dir, t_min: 0.0, t_max: f64::INFINITY };
             let found = self.tree.stores().refine(wave.tile.hit(p, i), &ray, f64::from(t[i]))?;
             (points[i], normals[i]) = (found.point.as_vec3().to_array(), found.normal.as_vec3().to_array());

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::camera::ExactPacket;
 use super::record::RayKind;
 use crate::accel::{PACKETS, Tile};
 use crate::lanes::{LANES, Mask8, Ray, RayPacket, Vec3x8, float8};
@@ -21,8 +22,8 @@ pub struct Wave {
     pub exact: Option<Box<ExactRays>>,
 }
 
-/// Origins and directions of 64 rays in f64.
-pub type ExactRays = [[(DVec3, DVec3); LANES]; PACKETS];
+/// 64 rays in f64.
+pub type ExactRays = [ExactPacket; PACKETS];
 
 /// A ray to be traced later.
 #[derive(Debug, Clone, Copy)]
@@ -55,8 +56,10 @@ impl Wave {
         let number = |f: fn(&Branch) -> u32| -> [[u32; LANES]; PACKETS] {
             std::array::from_fn(|p| std::array::from_fn(|i| lane(p, i).map_or(0, f)))
         };
-        let exact =
-            std::array::from_fn(|p| std::array::from_fn(|i| lane(p, i).map_or((DVec3::ZERO, DVec3::ONE), |b| b.exact)));
+        let mut exact = Box::new([ExactPacket::default(); PACKETS]);
+        for (k, branch) in branches.iter().enumerate() {
+            exact[k / LANES].set_lane(k % LANES, branch.exact.0, branch.exact.1);
+        }
         Wave {
             tile: Tile::new(std::array::from_fn(packet), None),
             kind,
@@ -64,7 +67,7 @@ impl Wave {
             weight: std::array::from_fn(|p| ray(p, |b| b.weight, [0.0; 3])),
             slots: Some(number(|b| u32::from(b.slot)).map(|slots| slots.map(|slot| slot as u8))),
             paths: number(|b| b.path),
-            exact: Some(Box::new(exact)),
+            exact: Some(exact),
         }
     }
 

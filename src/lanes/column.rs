@@ -40,7 +40,11 @@ impl Column {
     /// Lane `k` is row `rows[k]`.
     #[inline(always)]
     pub fn gather(&self, rows: [u32; LANES]) -> Float8 {
-        Float8::from(rows.map(|row| self.0[row as usize]))
+        let mut lanes = [0.0; LANES];
+        for (lane, row) in lanes.iter_mut().zip(rows) {
+            *lane = self.0[row as usize];
+        }
+        Float8::from(lanes)
     }
 
     /// Row `i`.

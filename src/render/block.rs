@@ -2,7 +2,7 @@
 
 use crate::accel::{PACKETS, Tile};
 use crate::film::{Picture, Window};
-use crate::integrate::{CameraRays, Direct, ExactRays, RayKind, Record, Room, Samples};
+use crate::integrate::{CameraRays, Direct, ExactRays, RayKind, Record, Room, Samples, Samples8};
 use crate::lanes::LANES;
 
 /// Pixels along an edge.
@@ -94,7 +94,7 @@ impl Block {
 /// Samples that wait for their tile to fill.
 #[derive(Default)]
 struct Pending {
-    samples: [[(i32, i32, u32, u32); LANES]; PACKETS],
+    samples: [Samples8; PACKETS],
     pixels: [[u32; LANES]; PACKETS],
     count: usize,
 }
@@ -103,7 +103,9 @@ impl Pending {
     #[inline(always)]
     fn push(&mut self, sample: (i32, i32, u32, u32), pixel: usize) {
         let (p, i) = (self.count / LANES, self.count % LANES);
-        (self.samples[p][i], self.pixels[p][i]) = (sample, pixel as u32);
+        let samples = &mut self.samples[p];
+        (samples.x[i], samples.y[i], samples.key[i], samples.index[i]) = sample;
+        self.pixels[p][i] = pixel as u32;
         self.count += 1;
     }
 
@@ -112,7 +114,8 @@ impl Pending {
     }
 
     fn samples(&self) -> impl Iterator<Item = (i32, i32, u32)> {
-        self.samples.iter().flatten().take(self.count).map(|&(x, y, _, sample)| (x, y, sample))
+        let lane = |k: usize| (&self.samples[k / LANES], k % LANES);
+        (0..self.count).map(lane).map(|(samples, i)| (samples.x[i], samples.y[i], samples.index[i]))
     }
 
     fn rays(&self, rays: &CameraRays, keep_exact: bool) -> (Tile, Option<Box<ExactRays>>) {
