@@ -6,6 +6,8 @@
 //! all rays that share an origin. Where a kernel cannot tell hit from miss it says so, and the pair is
 //! decided in f64 from the scene's own numbers ([`Store::decide`]).
 
+#[cfg(test)]
+pub(crate) mod brute;
 mod cone;
 mod cuboid;
 mod cylinder;
@@ -14,6 +16,8 @@ mod plane;
 mod polygon;
 mod sphere;
 mod stores;
+#[cfg(test)]
+mod tests;
 mod turned;
 
 use glam::{DVec2, DVec3};
