@@ -25,6 +25,8 @@ pub struct Plan<'s> {
     pub colored: bool,
     /// Some polygon has normals.
     pub smooth: bool,
+    /// Rays go on from some material: hits are found again in f64, since curved mirrors multiply rounding.
+    pub scatters: bool,
 }
 
 impl<'s> Plan<'s> {
@@ -37,7 +39,8 @@ impl<'s> Plan<'s> {
             _ => false,
         };
         let smooth = scene.objects.iter().any(has_normals);
-        Plan { scene, origin, visible, colored, smooth }
+        let scatters = scene.materials.iter().any(|material| material.model.scatters());
+        Plan { scene, origin, visible, colored, smooth, scatters }
     }
 
     /// All parts of the scene, relative to the origin.
