@@ -77,7 +77,10 @@ fn decided<S: Store>(
         }
         let i = row(lane);
         let visible = if cull { store.sides().row(i) } else { Visible::Both };
-        S::decide(store.parts().get(i)?, &Ray64::exact(&rays.lane(lane)), visible).map(|t| t as f32)
+        let (place, exact) = (t.to_array()[lane], Ray64::exact(&rays.lane(lane)));
+        let keeps = mask.bits() >> lane & 1 == 1;
+        let ray = if keeps { exact.endless() } else { exact };
+        S::decide(store.parts().get(i)?, &ray, visible).map(|t| if keeps { place } else { t as f32 })
     };
     std::array::from_fn(lane)
 }
