@@ -268,7 +268,7 @@ fn lanes_alone_know_the_vector_crate_and_few_know_threads() {
                 assert!(at_home, "{} names {name}", file.name);
             }
         }
-        assert!(found >= 2, "{name} was found {found} times");
+        assert!(found >= 1, "{name} was not found at all");
     }
 }
 

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::{PACKETS, Tree, Walk};
-use crate::fixtures::{Dice, MAKERS, cuboid, disk, gray, plane, polygon, ray, scene_of, sphere, turn};
+use crate::fixtures::{Dice, MAKERS, cuboid, disk, exact, gray, plane, polygon, ray, scene_of, sphere, turn};
 use crate::lanes::{LANES, Ray};
 use crate::plan::Plan;
 use crate::scene::{Scene, Shape, Visible};
@@ -87,8 +87,13 @@ fn both_walks_meet_what_a_loop_over_everything_meets() {
         let mut dice = Dice(count as u64);
         let scene = scene_of(mixed(count, &mut dice));
         let tally = compare(&scene, &bundles(60, &mut dice));
-        // One of 1,000 is met by most rays, a lone one of 0.1 by few.
-        let least = [0, 5, 50, 2000][[0, 1, 10, 1000].partition_point(|few| *few < count)];
+        // Of 3,840 rays each; one of 1,000 is met by most, a lone small one by few.
+        let least = match count {
+            0 => 0,
+            1 => 1,
+            2..10 => 15,
+            _ => 1500,
+        };
         assert!(tally.hits >= least && tally.misses > 50 && tally.dark == tally.hits, "{count}: {tally:?}");
         assert!(count > 0 || tally.hits == 0);
     }
@@ -127,9 +132,14 @@ fn rays_in_faces_and_edges_touch_in_every_walk() {
     }
     let scene = scene_of(shapes);
     let mut rays = Vec::new();
+    let mut corner = [0.0; 3];
     for case in 0..64 * 150 {
+        if case % 64 == 0 {
+            corner = [0; 3].map(|_| dice.index(9) as f32 - 5.0);
+        }
         let (axis, sign) = (case / 64 % 3, if case / 192 % 2 == 0 { 1.0 } else { -1.0 });
-        let mut origin = [0; 3].map(|_| dice.index(11) as f32 - 5.0);
+        // Close enough together for a tile to go as one.
+        let mut origin = corner.map(|x| x + dice.index(3) as f32);
         let mut dir = [0; 3].map(|_| if dice.index(2) == 0 { 0.0f32 } else { -0.0 });
         origin[axis] = -8.0 * sign;
         dir[axis] = sign;
@@ -143,7 +153,9 @@ fn rays_in_faces_and_edges_touch_in_every_walk() {
 fn rays_that_begin_behind_their_origin_are_met_there() {
     let mut dice = Dice(9);
     let scene = scene_of(mixed(200, &mut dice));
-    let rays: Vec<Ray> = bundles(60, &mut dice).into_iter().map(|ray| Ray { t_min: -1e3, ..ray }).collect();
+    // The scene lies behind most of them.
+    let back = |ray: Ray| Ray { t_min: -1e3, t_max: 0.5, dir: ray.dir.map(|d| -d), ..ray };
+    let rays: Vec<Ray> = bundles(60, &mut dice).into_iter().map(back).collect();
     let tally = compare(&scene, &rays);
     assert!(tally.hits > 1000, "{tally:?}");
 }
@@ -155,11 +167,21 @@ fn of_coincident_primitives_the_first_one_wins_everywhere() {
     let (distinct, times) = (once.len(), 5);
     let shapes: Vec<Shape> = once.iter().cycle().take(distinct * times).cloned().collect();
     let scene = scene_of(shapes);
-    let rays = bundles(30, &mut dice);
-    assert!(compare(&scene, &rays).hits > 500);
+    let rays = bundles(90, &mut dice);
+    // A flat one seen edge-on may have its rounded `t` so far before its own box that the next copy's box is
+    // left out: which copy wins is open there.
     let tracer = crate::Tracer::new(&scene);
+    let edge_on = |ray: &Ray| {
+        let cos = |hit: crate::Hit| {
+            let (normal, dir) = (DVec3::from_array(hit.normal.map(f64::from)), exact(ray).dir);
+            normal.dot(dir.normalize()).abs()
+        };
+        tracer.closest_hit(ray).is_some_and(|hit| cos(hit) < 0.01)
+    };
+    let rays: Vec<Ray> = rays.into_iter().filter(|ray| !edge_on(ray)).collect();
+    assert!(compare(&scene, &rays).hits > 300);
     let met: Vec<_> = tracer.closest_hits(&rays).into_iter().flatten().collect();
-    assert!(met.len() > 500 && met.iter().all(|hit| (hit.primitive as usize) < distinct));
+    assert!(met.len() > 300 && met.iter().all(|hit| (hit.primitive as usize) < distinct));
 }
 
 /// Shapes of different kinds that meet in the very same places: a square as a polygon, as two triangles

@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-use super::Stores;
 use super::brute::{packet_against_rows, ray_against_rows};
+use super::{Ray64, RowRef, Stores};
 use crate::fixtures::{Dice, MAKERS, Maker, exact, gray, object, ray, turn};
 use crate::lanes::{Float8, LANES, Mask8, Ray, RayPacket, Vec3x8};
 use crate::plan::{Kind, Plan};
@@ -78,7 +78,7 @@ impl Bench {
                     }
                 }
                 // Directions of all lengths, and some rays that end early or start late.
-                let dir = aims[dice.index(2)] * (dice.index(21) as f64 - 10.0).exp2() / far;
+                let dir = aims[dice.index(2)] * (dice.index(61) as f64 - 30.0).exp2() / far;
                 let full = Ray { origin: start.origin, ..ray(origin, dir) };
                 let reach = (far / dir.length()) as f32;
                 match case % 7 {
@@ -160,7 +160,7 @@ fn kernels_agree_with_the_reference_in_every_lane_both_ways() {
         }
         // Of 165,000 pairs each, most of them misses: a ray meets few of eleven bodies.
         let least_misses = if name == "plane" { 10_000 } else { 100_000 };
-        assert!(total.hits > 4000 && total.misses > least_misses && total.ties < 5000, "{name}: {total:?}");
+        assert!(total.hits > 2000 && total.misses > least_misses && total.ties < 5000, "{name}: {total:?}");
     }
 }
 
@@ -219,5 +219,70 @@ fn with_dead(rays: &RayPacket, live: Mask8, junk: f32) -> RayPacket {
         t_min: live.select(rays.t_min, Float8::splat(f32::INFINITY)),
         t_max: live.select(rays.t_max, Float8::splat(f32::NEG_INFINITY)),
         inv_dd: live.select(rays.inv_dd, Float8::splat(junk)),
+    }
+}
+
+/// The row of a primitive that a ray meets first, and where.
+fn first_row(stores: &Stores, ray: &Ray, primitive: u32) -> Option<(f32, RowRef)> {
+    let of_kind = |kind| {
+        let rows = ray_against_rows(stores, kind, ray, false).into_iter().enumerate();
+        rows.filter_map(move |(row, t)| Some((t?, RowRef::new(kind, row))))
+    };
+    let rows = Kind::ALL.into_iter().flat_map(of_kind);
+    let own = rows.filter(|(_, row)| row.kind().map(|kind| stores.owner(kind, row.row()).primitive) == Some(primitive));
+    own.min_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+/// The points that light and spawned rays start from: in f64 the reference's own, in f32 no further from
+/// the surface than they say.
+#[test]
+fn surfaces_are_where_the_reference_has_them() {
+    for (name, maker) in MAKERS {
+        let mut judged = 0;
+        for (place, scale) in PLACES {
+            let mut bench = Bench::new(maker, at(place), scale, Visible::Both);
+            let references = bench.references();
+            let plan = Plan::new(&bench.scene, DVec3::ZERO);
+            let stores = Stores::new(plan.parts(), &plan.visible);
+            let wide = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
+            for case in 0..4000 {
+                let (center, dice) = (bench.center, &mut bench.dice);
+                let origin = center + dice.direction() * dice.log_between(0.5, 300.0) * scale;
+                let ray = ray(origin, center + dice.in_cube(2.5 * scale) - origin);
+                let primitive = case % SHAPES;
+                let Some((t, row)) = first_row(&stores, &ray, primitive as u32) else { continue };
+                let Some(want) = references[primitive].closest(&exact(&ray)) else { continue };
+                let dir = exact(&ray).dir;
+                let cos = want.normal.dot(dir.normalize()).abs();
+                if cos < 1e-2 {
+                    continue;
+                }
+                judged += 1;
+                let context = || format!("{name}: {:?} {ray:?} {want:?}", bench.scene.objects[primitive].shape);
+                // f64 rounds some sums of the largest number in the way; a slant magnifies that.
+                let size = want.point.length() + exact(&ray).origin.length() + scale;
+                let bound = 64.0 * f64::EPSILON * size / cos;
+                let fine = stores.refine(row, &Ray64::exact(&ray), f64::from(t)).expect("a row");
+                let along = (fine.t - want.t).abs() * dir.length();
+                assert!(along <= bound && (fine.point - want.point).length() <= bound, "{} {fine:?}", context());
+                // A cone turns round its tip at any rate; elsewhere within a tenth of the scale at most.
+                let turned = (fine.normal - want.normal).length();
+                let near_tip = name == "open cone" && turned < 1e-6;
+                assert!(near_tip || turned <= 1e-12 + 20.0 * bound / scale, "{} {fine:?} {turned:e}", context());
+
+                let lanes = Float8::splat(row.to_lane());
+                let coarse = stores.surface(lanes, &RayPacket::splat(&ray), Float8::splat(t));
+                let (point, normal) = (wide(coarse.point.lane(3)), wide(coarse.normal.lane(3)));
+                let off = point - want.point;
+                let other_face = normal.dot(want.normal) < 0.9;
+                let error = f64::from(coarse.error.to_array()[3]);
+                // What is off along the surface leaves its tangent plane by the square of that.
+                let bent = off.length_squared() / (0.1 * scale);
+                let height = off.dot(want.normal).abs();
+                assert!(other_face || height <= error + bent, "{}: {height:e} {error:e} {bent:e}", context());
+                assert!((normal.length() - 1.0).abs() < 4.0 * f64::from(f32::EPSILON), "{} {normal}", context());
+            }
+        }
+        assert!(judged > 200, "{name}: {judged}");
     }
 }
