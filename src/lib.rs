@@ -16,6 +16,13 @@ pub mod shade;
 pub mod shapes;
 mod tracer;
 
+// Fixtures name this crate as the tests outside of it do.
+#[cfg(test)]
+extern crate self as octray;
+#[cfg(test)]
+#[path = "../tests/common/mod.rs"]
+mod fixtures;
+
 pub use lanes::Ray;
 pub use render::{Progress, Renderer, Rendering};
 pub use scene::Scene;

@@ -141,12 +141,17 @@ fn decide<S: Store, const CULL: bool>(
         let lane = doubt.trailing_zeros() as usize;
         doubt &= doubt - 1;
         let i = row(lane);
+        let has_place = mask >> lane & 1 == 1;
+        mask &= !(1 << lane);
         let Some(part) = store.parts().get(i) else { continue };
         counts.redecided += 1;
         let visible = if CULL { store.sides().row(i) } else { Visible::Both };
-        let met = S::decide(part, &Ray64::exact(&rays.lane(lane)), visible);
-        mask = mask & !(1 << lane) | u32::from(met.is_some()) << lane;
-        t[lane] = met.map_or(t[lane], |t| t as f32);
+        let exact = Ray64::exact(&rays.lane(lane));
+        // Whether a place of the kernel's own lies on the ray is decided already.
+        let ray = if has_place { exact.endless() } else { exact };
+        let met = S::decide(part, &ray, visible);
+        mask |= u32::from(met.is_some()) << lane;
+        t[lane] = met.filter(|_| !has_place).map_or(t[lane], |t| t as f32);
     }
     *hit = Hit8 { t: Float8::from(t), mask: Mask8::from_bits(mask), doubt: Mask8::NONE };
 }

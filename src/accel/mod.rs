@@ -8,6 +8,8 @@ mod build;
 mod leaf;
 mod node;
 mod single;
+#[cfg(test)]
+mod tests;
 mod tile;
 
 pub use self::tile::{PACKETS, Tile};

@@ -49,6 +49,11 @@ impl Tile {
     /// Bounds of each packet, a lane a packet; `None` if they do not all go the same way or not together.
     fn beam(&self, scene_size: f32) -> Option<Beam> {
         let live = self.packets.map(|rays| rays.live());
+        let start = Float8::from(std::array::from_fn(|p| least(self.packets[p].t_min)));
+        // Behind the origins the nearest and the farthest ray change places.
+        if least(start) < 0.0 {
+            return None;
+        }
         let bounds = |axis: fn(&RayPacket) -> Float8| {
             let of = |fill: f32| -> [Float8; PACKETS] {
                 let lanes = std::array::from_fn(|p| live[p].select(axis(&self.packets[p]), float8(fill)));
@@ -91,7 +96,7 @@ impl Tile {
             inv_near: std::array::from_fn(|k| inverse(pick(dirs[k], back[k]), back[k])),
             inv_far: std::array::from_fn(|k| inverse(pick(dirs[k], !back[k]), back[k])),
             back,
-            start: Float8::from(std::array::from_fn(|p| least(self.packets[p].t_min))),
+            start,
         })
     }
 }

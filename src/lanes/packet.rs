@@ -73,7 +73,8 @@ pub struct Hit8 {
     pub t: Float8,
     /// Lanes that hit, as far as f32 can tell.
     pub mask: Mask8,
-    /// Lanes too close to call: hit or miss is to be decided in f64. They may or may not be in `mask`.
+    /// Lanes too close to call: hit or miss is to be decided in f64. Those in `mask` as well have a `t` that is
+    /// right if they hit, and keep it, so that coincident primitives have the same; the others get theirs in f64.
     pub doubt: Mask8,
 }
 

@@ -113,7 +113,7 @@ impl Store for Disks {
         let inside = Mask8::le(rho2, anchor.radius * anchor.radius) & Mask8::ge(rho2, anchor.inner * anchor.inner);
         let hole = Mask8::gt(anchor.inner, Float8::ZERO);
         let doubt = on_ray & (near_rim(anchor.radius) | (near_rim(anchor.inner) & hole));
-        Hit8 { t, mask: on_ray & inside & !doubt, doubt }
+        Hit8 { t, mask: (on_ray & inside) | doubt, doubt }
     }
 
     fn decide(part: &DiskPart, ray: &Ray64, visible: Visible) -> Option<f64> {

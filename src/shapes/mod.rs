@@ -6,6 +6,8 @@
 //! all rays that share an origin. Where a kernel cannot tell hit from miss it says so, and the pair is
 //! decided in f64 from the scene's own numbers ([`Store::decide`]).
 
+#[cfg(test)]
+pub(crate) mod brute;
 mod cone;
 mod cuboid;
 mod cylinder;
@@ -14,6 +16,8 @@ mod plane;
 mod polygon;
 mod sphere;
 mod stores;
+#[cfg(test)]
+mod tests;
 mod turned;
 
 use glam::{DVec2, DVec3};
@@ -116,8 +120,15 @@ impl Ray64 {
         Ray64 { origin, dir, t_min: f64::from(ray.t_min), t_max: f64::from(ray.t_max) }
     }
 
-    /// Whether a hit at `t` lies on the ray.
+    /// The whole line.
+    pub fn endless(self) -> Self {
+        Ray64 { t_min: f64::NEG_INFINITY, t_max: f64::INFINITY, ..self }
+    }
+
+    /// Whether a hit at `t` lies on the ray. Hits are stored in f32, and so they are compared: else of two
+    /// hits at the same place the second would lie beyond the first where that was rounded down.
     pub fn accepts(&self, t: f64) -> bool {
+        let t = f64::from(t as f32);
         self.t_min < t && t <= self.t_max
     }
 

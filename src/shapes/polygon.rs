@@ -114,7 +114,7 @@ impl<const N: usize> Store for Polygons<N> {
             possible &= !side_hidden(nd, &anchor.hidden);
         }
         let doubt = possible & Mask8::le(least, bound);
-        Hit8 { t, mask: possible & !doubt, doubt }
+        Hit8 { t, mask: possible, doubt }
     }
 
     fn decide(part: &PolygonPart<N>, ray: &Ray64, visible: Visible) -> Option<f64> {

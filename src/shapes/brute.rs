@@ -1,0 +1,86 @@
+//! Every row asked, without a tree: what the tests hold kernels and walks against.
+
+use super::{Ray64, RowRef, Store, Stores, Visit};
+use crate::lanes::{Hit8, LANES, Ray, RayPacket};
+use crate::plan::Kind;
+use crate::scene::Visible;
+
+/// By row of a kind, what eight rays make of it: a lane a ray.
+pub fn packet_against_rows(stores: &Stores, kind: Kind, rays: &RayPacket, cull: bool) -> Vec<[Option<f32>; LANES]> {
+    stores.visit(kind, ByRow { rays, cull })
+}
+
+/// By row of a kind, where one ray meets it: a lane a row.
+pub fn ray_against_rows(stores: &Stores, kind: Kind, ray: &Ray, cull: bool) -> Vec<Option<f32>> {
+    stores.visit(kind, ByBlock { rays: RayPacket::splat(ray), cull })
+}
+
+/// What one ray meets first: of equal places the lowest primitive, as the walks have it.
+pub fn closest(stores: &Stores, ray: &Ray, cull: bool) -> Option<(f32, RowRef)> {
+    let mut best: Option<(f32, RowRef)> = None;
+    for kind in Kind::ALL {
+        for (row, t) in ray_against_rows(stores, kind, ray, cull).into_iter().enumerate() {
+            let (Some(t), row) = (t, RowRef::new(kind, row)) else { continue };
+            best = Some(match best {
+                Some((other, _)) if t < other => (t, row),
+                Some((other, old)) if t == other => (t, stores.first_of(old, row)),
+                Some(old) => old,
+                None => (t, row),
+            });
+        }
+    }
+    best
+}
+
+struct ByRow<'a> {
+    rays: &'a RayPacket,
+    cull: bool,
+}
+
+impl Visit for ByRow<'_> {
+    type Output = Vec<[Option<f32>; LANES]>;
+    fn visit<S: Store>(self, store: &S) -> Self::Output {
+        (0..store.parts().len()).map(|i| decided(store, &store.splat(i), self.rays, self.cull, |_| i)).collect()
+    }
+}
+
+struct ByBlock {
+    rays: RayPacket,
+    cull: bool,
+}
+
+impl Visit for ByBlock {
+    type Output = Vec<Option<f32>>;
+    fn visit<S: Store>(self, store: &S) -> Self::Output {
+        let count = store.parts().len();
+        let block = |first| decided(store, &store.block(first), &self.rays, self.cull, move |lane| first + lane);
+        let mut all: Vec<Option<f32>> = (0..count).step_by(LANES).flat_map(block).collect();
+        assert!(all[count..].iter().all(Option::is_none), "a padding row was hit");
+        all.truncate(count);
+        all
+    }
+}
+
+/// The kernel's answers, doubts decided.
+fn decided<S: Store>(
+    store: &S,
+    rows: &S::Row,
+    rays: &RayPacket,
+    cull: bool,
+    row: impl Fn(usize) -> usize,
+) -> [Option<f32>; LANES] {
+    let anchor = S::anchor(rows, &rays.origin);
+    let Hit8 { t, mask, doubt } = if cull { S::hit::<true>(&anchor, rays) } else { S::hit::<false>(&anchor, rays) };
+    let lane = |lane: usize| {
+        if doubt.bits() >> lane & 1 == 0 {
+            return (mask.bits() >> lane & 1 == 1).then(|| t.to_array()[lane]);
+        }
+        let i = row(lane);
+        let visible = if cull { store.sides().row(i) } else { Visible::Both };
+        let (place, exact) = (t.to_array()[lane], Ray64::exact(&rays.lane(lane)));
+        let keeps = mask.bits() >> lane & 1 == 1;
+        let ray = if keeps { exact.endless() } else { exact };
+        S::decide(store.parts().get(i)?, &ray, visible).map(|t| if keeps { place } else { t as f32 })
+    };
+    std::array::from_fn(lane)
+}
