@@ -83,12 +83,7 @@ impl<const N: usize> Rows<N> {
 impl Cloud {
     /// How many primitives.
     pub fn len(&self) -> usize {
-        match &self.shapes {
-            CloudShapes::Spheres(rows) => rows.len(),
-            CloudShapes::Disks(rows) => rows.len(),
-            CloudShapes::Boxes(rows, _) => rows.len(),
-            CloudShapes::Polygons { starts, .. } => starts.len().saturating_sub(1),
-        }
+        self.shapes.len()
     }
 
     /// Whether there is none.
@@ -102,16 +97,34 @@ impl Cloud {
             CloudMaterial::One(material) => *material,
             CloudMaterial::Each(materials) => materials[i] as usize,
         };
-        Primitive { shape: Cow::Owned(self.shape(i)), material, color: self.color(i) }
+        Primitive { shape: Cow::Owned(self.shapes.shape(i)), material, color: self.color(i) }
     }
 
     /// Factor on the colour of row `i`'s material.
     pub fn color(&self, i: usize) -> DVec3 {
         self.colors.as_ref().map_or(DVec3::ONE, |colors| DVec3::from_array(colors[i].map(f64::from)))
     }
+}
 
-    fn shape(&self, i: usize) -> Shape {
-        match &self.shapes {
+impl CloudShapes {
+    /// How many rows.
+    pub fn len(&self) -> usize {
+        match self {
+            CloudShapes::Spheres(rows) => rows.len(),
+            CloudShapes::Disks(rows) => rows.len(),
+            CloudShapes::Boxes(rows, _) => rows.len(),
+            CloudShapes::Polygons { starts, .. } => starts.len().saturating_sub(1),
+        }
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Row `i` as a shape.
+    pub fn shape(&self, i: usize) -> Shape {
+        match self {
             CloudShapes::Spheres(rows) => {
                 let [x, y, z, radius] = rows.row(i);
                 Shape::Sphere(Sphere { center: DVec3::new(x, y, z), radius })

@@ -1,8 +1,9 @@
 //! What is wrong with a scene, and where: every reader speaks of mistakes through these types.
 //!
-//! An error is one line that an editor can jump to, `scenes/balls.toml:12:9: sphere radius must be
-//! > 0, found -1`; [`SceneErrors::report`] adds the line itself, a caret and a hint. A reader collects
-//! all errors of all files it reads and gives them back at once.
+//! An error is one line that an editor can jump to, such as
+//! `scenes/balls.toml:12:9: sphere radius must be > 0, found -1`; [`SceneErrors::report`] adds the line
+//! itself, a caret and a hint. A reader collects all errors of all files it reads and gives them back
+//! at once.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -191,6 +192,13 @@ impl SceneErrors {
     /// Whether nothing is wrong.
     pub fn is_empty(&self) -> bool {
         self.errors.is_empty()
+    }
+
+    /// Puts the errors in the order of their places: by file as the texts were added, then by line.
+    pub(crate) fn sort(&mut self) {
+        let SceneErrors { errors, sources, .. } = self;
+        let file = |error: &SceneError| sources.iter().position(|source| source.path() == error.place.path);
+        errors.sort_by_cached_key(|error| (file(error), error.place.line, error.place.column));
     }
 
     /// How many errors there are, those past the first hundred included.

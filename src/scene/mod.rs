@@ -1,6 +1,6 @@
 //! What the user wrote: every quantity in f64, every thing by name or index, in world coordinates.
 //!
-//! This room answers for the data of a scene, for reading it ([`toml`], [`nff`], [`cloud`]) and for
+//! This room answers for the data of a scene, for reading it ([`Scene::load`]) and for
 //! the rules that a valid scene keeps. It leaves to others what a render makes of it: both tracers,
 //! the packet engine and the reference, start from the same [`Scene`] and share nothing else but
 //! the sampler. Group transforms are applied when a scene is read, so all geometry here is in world
@@ -9,17 +9,21 @@
 mod background;
 mod camera;
 mod cloud;
+pub(crate) mod cloud_file;
 pub mod error;
 mod image;
 mod light;
 mod material;
 pub mod nff;
+pub(crate) mod picture_file;
 pub mod rules;
 mod shape;
 mod texture;
+mod toml;
 pub mod write;
 
 use std::borrow::Cow;
+use std::path::Path;
 
 use glam::DVec3;
 
@@ -89,7 +93,34 @@ pub struct Primitive<'a> {
     pub color: DVec3,
 }
 
+/// The JSON Schema (draft 2020-12) of scene files, by which editors complete and check them.
+pub const SCHEMA: &str = include_str!("schema.json");
+
 impl Scene {
+    /// Reads a scene file, its kind by its name: `.toml`, `.nff` or `.nff.gz`; with all files that it names.
+    ///
+    /// # Errors
+    /// All mistakes of all files; each with its place.
+    pub fn load(path: impl AsRef<Path>) -> Result<Scene, SceneErrors> {
+        let path = path.as_ref();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+        if name.ends_with(".toml") {
+            toml::load(path)
+        } else if name.ends_with(".nff") || name.ends_with(".nff.gz") {
+            nff::load(path)
+        } else {
+            Err(SceneError::of_file(path, "a scene file must end in .toml, .nff or .nff.gz", "").into())
+        }
+    }
+
+    /// Reads a scene in TOML; its relative paths start at `base_dir`.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub fn from_toml(text: &str, base_dir: &Path) -> Result<Scene, SceneErrors> {
+        toml::from_text(text, base_dir)
+    }
+
     /// How many primitives the scene has: objects, then the rows of each cloud.
     pub fn primitive_count(&self) -> usize {
         self.objects.len() + self.clouds.iter().map(Cloud::len).sum::<usize>()

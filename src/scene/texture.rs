@@ -75,7 +75,7 @@ pub enum TextureFilter {
 }
 
 /// How a file's values become linear ones.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ColorSpace {
     /// By the piecewise sRGB curve (IEC 61966-2-1).
     Srgb,

@@ -189,7 +189,7 @@ mod tests {
     fn star(n: usize, inner: f64) -> Polygon {
         let corner = |i: usize| {
             let (sin, cos) = (std::f64::consts::TAU * i as f64 / n as f64).sin_cos();
-            let r = if i % 2 == 0 { 1.0 } else { inner };
+            let r = if i.is_multiple_of(2) { 1.0 } else { inner };
             [r * cos, r * sin]
         };
         polygon(&(0..n).map(corner).collect::<Vec<_>>())

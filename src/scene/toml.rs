@@ -1,0 +1,143 @@
+//! Scenes in TOML: octray's own format.
+//!
+//! A load goes through three steps: [`files`] reads and parses a file and those it includes, the modules
+//! of each part of the format read their tables of all files in merge order, and what is left over is
+//! reported. Parts go by name first (groups, textures, materials), so that a name may be used before
+//! the line that gives it. All mistakes of all files come back together.
+
+mod clouds;
+mod files;
+mod groups;
+mod lights;
+mod looks;
+mod names;
+mod settings;
+mod shapes;
+mod table;
+mod values;
+
+use std::path::Path;
+
+use self::files::Texts;
+use self::groups::Transform;
+use self::looks::Pictures;
+use self::names::Names;
+use self::table::{Context, Item, Table};
+use crate::scene::{Scene, SceneErrors};
+
+/// Primitives of a scene: their indices are stored as i32.
+const MOST_PRIMITIVES: usize = i32::MAX as usize;
+
+/// Reads a scene file and all that it names.
+///
+/// # Errors
+/// Every rule that any of the files breaks.
+pub fn load(path: &Path) -> Result<Scene, SceneErrors> {
+    read(|texts| texts.load(path))
+}
+
+/// Reads a scene from text; its relative paths start at `base_dir`.
+///
+/// # Errors
+/// As [`load`]; places in the text are in a file named `<text>`.
+pub fn from_text(text: &str, base_dir: &Path) -> Result<Scene, SceneErrors> {
+    read(|texts| texts.add(Path::new("<text>"), base_dir, text))
+}
+
+fn read(start: impl FnOnce(&mut Texts)) -> Result<Scene, SceneErrors> {
+    let mut texts = Texts::default();
+    start(&mut texts);
+    let files = texts.parse();
+    let roots = files.iter().map(|file| Context { file, log: &texts.log }.root());
+    let scene = Reader::new(roots.collect()).scene();
+    drop(files);
+    let (errors, warnings) = texts.log.into_parts();
+    if errors.is_empty() { Ok(Scene { warnings, ..scene }) } else { Err(errors) }
+}
+
+/// What is known of a scene while its files are read.
+struct Reader<'a> {
+    /// The top-level tables in merge order.
+    roots: Vec<Table<'a>>,
+    materials: Names,
+    textures: Names,
+    groups: Names,
+    transforms: Vec<Transform>,
+    pictures: Pictures,
+    scene: Scene,
+}
+
+impl<'a> Reader<'a> {
+    fn new(roots: Vec<Table<'a>>) -> Self {
+        Reader {
+            roots,
+            materials: Names::new("material"),
+            textures: Names::new("texture"),
+            groups: Names::new("group"),
+            transforms: Vec::new(),
+            pictures: Pictures::default(),
+            scene: Scene::default(),
+        }
+    }
+
+    /// The scene, which counts only if nothing was noted in the log.
+    fn scene(mut self) -> Scene {
+        for root in &self.roots {
+            read_format(root);
+            root.has("include");
+        }
+        self.read_settings();
+        self.read_groups();
+        self.read_looks();
+        self.read_lights();
+        self.read_shapes();
+        self.read_clouds();
+        for root in std::mem::take(&mut self.roots) {
+            root.finish();
+        }
+        self.scene.groups = self.groups.into_list();
+        self.scene
+    }
+
+    /// The tables of `[[key]]` of all files.
+    fn tables(&self, key: &'static str, what: &'static str) -> Vec<Table<'a>> {
+        self.roots.iter().flat_map(|root| root.tables(key, what)).collect()
+    }
+
+    /// The table `[key]`, which one file alone may give.
+    fn single(&self, key: &'static str) -> Option<Table<'a>> {
+        let items: Vec<Item<'a>> = self.roots.iter().filter_map(|root| root.item(key)).collect();
+        let (first, rest) = items.split_first()?;
+        for item in rest {
+            let help = format!("the first one is at {}", first.context.place(&first.span));
+            item.context.fail_with_help(&item.span, format!("[{key}] is given twice"), help);
+        }
+        first.table()
+    }
+
+    /// The group that a shape or cloud names, with its transform.
+    fn group(&self, table: &Table<'a>) -> Option<(Option<usize>, Transform)> {
+        let group = table.maybe("group", |item| self.groups.find(item))?;
+        let transform = group.and_then(|group| self.transforms.get(group)).copied();
+        Some((group, transform.unwrap_or_default()))
+    }
+}
+
+/// The format that this version reads is 1.
+fn read_format(root: &Table<'_>) {
+    let Some(item) = root.item("format") else {
+        root.missing::<()>("\"format\": start it with format = 1");
+        return;
+    };
+    if item.value.as_integer().is_none_or(|format| format.as_str() != "1") {
+        item.wrong::<()>("must be 1, the only one that this version reads");
+    }
+}
+
+impl<'a> Context<'a> {
+    fn root(self) -> Table<'a> {
+        let mut root = Table::new(self, "a scene file", &self.file.root, 0..0);
+        root.owner = "";
+        root
+    }
+}

@@ -1,0 +1,194 @@
+//! `[image]`, `[render]`, cameras, `[background]`, `[ambient]`.
+
+use glam::DVec3;
+
+use super::Reader;
+use super::names::Names;
+use super::table::{Item, Table};
+use super::values::{choice, color, direction, file, flag, number, point, text, whole};
+use crate::scene::rules::{self, Rule};
+use crate::scene::{
+    Backdrop, Background, Camera, Filter, FilterKind, ImageSettings, ImageTexture, Integrator, Lens, RenderSettings,
+    TextureFilter, Wrap,
+};
+
+/// Most pixels along one side.
+const MOST_PIXELS_A_SIDE: u64 = 65_536;
+/// Most pixels of a picture.
+const MOST_PIXELS: u64 = 1 << 30;
+/// Most samples of one pixel.
+const MOST_SAMPLES: u64 = 1 << 20;
+/// Longest chain of rays: without a bound two mirrors would exhaust the stack.
+const DEEPEST: u64 = 1000;
+
+const FILTERS: &[(&str, FilterKind)] =
+    &[("gaussian", FilterKind::Gaussian), ("box", FilterKind::Box), ("blackman-harris", FilterKind::BlackmanHarris)];
+
+#[derive(Clone, Copy)]
+enum LensKind {
+    Pinhole,
+    Orthographic,
+}
+
+const LENSES: &[(&str, LensKind)] = &[("pinhole", LensKind::Pinhole), ("orthographic", LensKind::Orthographic)];
+const LATER_LENS: &str = "thin-lens and panoramic cameras are not in this version: use \"pinhole\" or \"orthographic\"";
+const LATER_LENSES: &[(&str, &str)] = &[("thin-lens", LATER_LENS), ("panoramic", LATER_LENS)];
+
+impl<'a> Reader<'a> {
+    /// Reads all tables that are there once.
+    pub fn read_settings(&mut self) {
+        self.scene.image = self.single("image").and_then(image);
+        if let Some(render) = self.single("render").and_then(render) {
+            self.scene.render = render;
+        }
+        self.read_cameras();
+        if let Some(table) = self.single("background") {
+            self.scene.background = self.background(table).unwrap_or_default();
+        }
+        if let Some(table) = self.single("ambient") {
+            self.scene.ambient = table.or("color", DVec3::ZERO, color).unwrap_or_default();
+            table.finish();
+        }
+    }
+
+    fn read_cameras(&mut self) {
+        let lone = self.single("camera");
+        let several = self.tables("cameras", "camera");
+        if let (Some(lone), Some(first)) = (&lone, several.first()) {
+            let rule = "a scene has one [camera] or several [[cameras]], not both";
+            first.context.fail_with_help(
+                &first.span,
+                rule,
+                format!("[camera] is at {}", lone.context.place(&lone.span)),
+            );
+        }
+        let mut names = Names::new("camera");
+        let cameras = lone.and_then(|table| camera(table, None)).into_iter();
+        let several = several.into_iter().filter_map(|table| {
+            let name = table.need("name", |item| {
+                let name = text(item)?;
+                names.give(&name, table.context, &item.span)?;
+                Some(name)
+            });
+            camera(table, name)
+        });
+        self.scene.cameras = cameras.chain(several).collect();
+    }
+
+    fn background(&mut self, table: Table<'a>) -> Option<Background> {
+        let flat = table.maybe("color", color);
+        let (top, bottom) = (table.maybe("top", color), table.maybe("bottom", color));
+        let picture = table.maybe("image", |item| Some((file(item)?, item.clone())));
+        let scale = table.maybe("scale", number(Rule::COLOR));
+        let rotation = table.maybe("rotation", number(Rule::FINITE));
+        let transparent = table.or("transparent", false, flag);
+        let lonely = if picture.as_ref().is_some_and(Option::is_none) { picture_only(&table) } else { None };
+        let choices = (flat?, top?, bottom?, picture?, lonely);
+        let backdrop = match choices {
+            (_, _, _, None, Some(key)) => {
+                table.exclusive(format!("background {key} needs an \"image\" that it applies to"), &[key])
+            }
+            (None, None, None, None, None) => Some(Backdrop::default()),
+            (Some(color), None, None, None, None) => Some(Backdrop::Color(color)),
+            (None, Some(top), Some(bottom), None, None) => Some(Backdrop::Gradient { top, bottom }),
+            (None, None, None, Some((named, item)), _) => self.picture(&item, &named, None).map(|picture| {
+                let image = ImageTexture {
+                    file: named.path,
+                    wrap: Wrap::default(),
+                    filter: TextureFilter::default(),
+                    color_space: picture.color_space,
+                    width: picture.width,
+                    height: picture.height,
+                    texels: picture.texels,
+                };
+                let (scale, rotation) = (scale.flatten().unwrap_or(1.0), rotation.flatten().unwrap_or(0.0));
+                Backdrop::Image { image: Box::new(image), scale, rotation }
+            }),
+            (None, Some(_), None, None, None) => table.missing("\"bottom\" as well as \"top\""),
+            (None, None, Some(_), None, None) => table.missing("\"top\" as well as \"bottom\""),
+            _ => {
+                let rule = "background is one of \"color\", \"top\" and \"bottom\", or \"image\"".to_owned();
+                table.exclusive(rule, &["color", "top", "bottom", "image"])
+            }
+        };
+        table.finish();
+        Some(Background { backdrop: backdrop?, transparent: transparent? })
+    }
+}
+
+/// A key that means nothing without a picture.
+fn picture_only(table: &Table<'_>) -> Option<&'static str> {
+    ["scale", "rotation"].into_iter().find(|key| table.has(key))
+}
+
+fn image(table: Table<'_>) -> Option<ImageSettings> {
+    let width = table.need("width", whole(1, MOST_PIXELS_A_SIDE));
+    let height = table.need("height", whole(1, MOST_PIXELS_A_SIDE));
+    let spp = table.or("spp", 16, whole(1, MOST_SAMPLES));
+    let kind = table.or("filter", FilterKind::Gaussian, choice(FILTERS));
+    let radius = if kind == Some(FilterKind::Box) { 0.5 } else { 1.5 };
+    let radius = table.or("filter_radius", radius, number(Rule::FILTER_RADIUS));
+    if let Some(item) = table.item("aovs") {
+        no_layers(&item);
+    }
+    if let (Some(width), Some(height)) = (width, height)
+        && width * height > MOST_PIXELS
+    {
+        let item = table.item("height")?;
+        item.context.fail(&item.span, "image must have at most 2^30 pixels", format!("{width} x {height}"));
+    }
+    table.finish();
+    let filter = Filter { kind: kind?, radius: radius? };
+    Some(ImageSettings { width: width? as u32, height: height? as u32, spp: spp? as u32, filter })
+}
+
+fn no_layers(item: &Item<'_>) {
+    match item.elements().map(|elements| elements.len()) {
+        Some(0) => {}
+        Some(_) => {
+            let rule = "layers besides colour are not in this version: leave \"aovs\" out";
+            item.context.fail(&item.span, rule, item.quote());
+        }
+        None => {
+            item.wrong::<()>("must be a list of names");
+        }
+    }
+}
+
+fn render(table: Table<'_>) -> Option<RenderSettings> {
+    let integrator = table.or("integrator", Integrator::Direct, |item| {
+        if matches!(item.value.as_str(), Some("ao" | "path")) {
+            let rule = "the integrators \"ao\" and \"path\" are not in this version: use \"direct\"";
+            item.context.fail(&item.span, rule, "");
+            return None;
+        }
+        choice(&[("direct", Integrator::Direct)])(item)
+    });
+    let max_depth = table.or("max_depth", 5, whole(1, DEEPEST));
+    let seed = table.or("seed", 0, whole(0, u64::MAX));
+    if let Some(item) = table.item("noise") {
+        let rule = "rendering to a noise level is not in this version: leave \"noise\" out and set \"spp\" of [image]";
+        item.context.fail(&item.span, rule, "");
+    }
+    table.finish();
+    Some(RenderSettings { integrator: integrator?, max_depth: max_depth? as u32, seed: seed? })
+}
+
+fn camera(mut table: Table<'_>, name: Option<String>) -> Option<Camera> {
+    let kind = table.kind(LENSES, LATER_LENSES)?;
+    let lens = match kind {
+        LensKind::Pinhole => table.need("vfov", number(Rule::VFOV)).map(|vfov| Lens::Pinhole { vfov }),
+        LensKind::Orthographic => {
+            table.need("height", number(Rule::LENGTH)).map(|height| Lens::Orthographic { height })
+        }
+    };
+    let (eye, target) = (table.need("eye", point), table.need("target", point));
+    let up = table.or("up", DVec3::Y, direction);
+    let camera = (|| Some(Camera { name, eye: eye?, target: target?, up: up?, lens: lens? }))();
+    let camera = camera.and_then(|camera| match rules::camera(&camera) {
+        Ok(()) => Some(camera),
+        Err(broken) => table.broken(broken),
+    });
+    table.finish();
+    camera
+}
