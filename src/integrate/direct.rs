@@ -86,7 +86,9 @@ impl<'s> Direct<'s> {
 
     fn trace<R: Record>(&self, mut wave: Wave, samples: &mut Samples, room: &mut Room, record: &mut R) {
         let live = wave.tile.packets.map(|rays| rays.live().bits());
+        let redecided = room.walk.counts.redecided;
         self.tree.closest_tile(&mut wave.tile, &mut room.walk);
+        room.rays.redecided[wave.kind as usize] += room.walk.counts.redecided - redecided;
         let mut shaded = [None; PACKETS];
         for p in 0..PACKETS {
             if live[p] == 0 {
@@ -268,7 +270,9 @@ impl<'s> Direct<'s> {
             };
             let t_max = packets.map(|rays| rays.t_max.to_array());
             let mut tile = Tile::new(packets, common);
+            let redecided = room.walk.counts.redecided;
             self.tree.occluded_tile(&mut tile, &mut room.walk);
+            room.rays.redecided[RayKind::Shadow as usize] += room.walk.counts.redecided - redecided;
             for p in 0..PACKETS {
                 let bright = tile.packets[p].live().bits();
                 room.rays.rays[RayKind::Shadow as usize] += u64::from(lit[p].count_ones());

@@ -37,6 +37,8 @@ pub struct RayCounts {
     pub rays: [u64; RayKind::ALL.len()],
     /// Those that met something.
     pub hits: [u64; RayKind::ALL.len()],
+    /// (Ray, primitive) pairs decided again in f64.
+    pub redecided: [u64; RayKind::ALL.len()],
 }
 
 impl RayCounts {
@@ -45,6 +47,7 @@ impl RayCounts {
         for kind in RayKind::ALL {
             self.rays[kind as usize] += other.rays[kind as usize];
             self.hits[kind as usize] += other.hits[kind as usize];
+            self.redecided[kind as usize] += other.redecided[kind as usize];
         }
     }
 }
@@ -54,6 +57,8 @@ impl RayCounts {
 pub trait Record {
     /// Whether anything is to be told: what only the record needs is left out otherwise.
     const ON: bool;
+    /// A tile of camera rays begins: pixel and sample index by slot.
+    fn tile(&mut self, samples: &mut dyn Iterator<Item = (i32, i32, u32)>);
     /// A ray met a primitive, or nothing; `ray` holds the very bits that were traced, `t` where it was met.
     fn ray(&mut self, kind: RayKind, ray: Ray, met: Option<u32>, t: f32, slot: usize, path: u32);
     /// A surface at the end of a path was lit by a light, or lay in shadow.
@@ -70,6 +75,7 @@ pub struct Silent;
 
 impl Record for Silent {
     const ON: bool = false;
+    fn tile(&mut self, _: &mut dyn Iterator<Item = (i32, i32, u32)>) {}
     fn ray(&mut self, _: RayKind, _: Ray, _: Option<u32>, _: f32, _: usize, _: u32) {}
     fn shadow(&mut self, _: usize, _: Ray, _: bool, _: usize, _: u32) {}
     fn lit(&mut self, _: usize, _: usize, _: u32) {}

@@ -51,6 +51,9 @@ impl Block {
         let (mut tiles, mut background_tiles) = (0, 0);
         let mut pending = Pending::default();
         let mut flush = |pending: &mut Pending, room: &mut Room| {
+            if R::ON {
+                record.tile(&mut pending.samples());
+            }
             let met = room.rays.hits[RayKind::Camera as usize];
             let samples = direct.radiance(pending.tile(rays), room, record);
             pending.add_to(&samples, &mut sums);
@@ -105,6 +108,10 @@ impl Pending {
 
     fn clear(&mut self) {
         self.count = 0;
+    }
+
+    fn samples(&self) -> impl Iterator<Item = (i32, i32, u32)> {
+        self.samples.iter().flatten().take(self.count).map(|&(x, y, _, sample)| (x, y, sample))
     }
 
     fn tile(&self, rays: &CameraRays) -> Tile {

@@ -6,6 +6,7 @@ mod stats;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Instant;
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 pub use self::stats::Stats;
@@ -13,7 +14,7 @@ pub use self::stats::Stats;
 use self::block::{Block, BlockWork};
 use crate::accel::Tree;
 use crate::film::{Picture, Window};
-use crate::integrate::{CameraRays, Direct, Record, Silent};
+use crate::integrate::{CameraRays, Direct, RayCounts, Record, Silent};
 use crate::plan::Plan;
 use crate::scene::{Camera, ImageSettings, Scene};
 
@@ -227,22 +228,6 @@ impl<'s> Renderer<'s> {
         })
     }
 
-    /// Traces some pixels, in order, on this thread, while a record looks on; returns their values.
-    pub fn render_pixels<R: Record>(
-        &self,
-        pixels: &[(i32, i32)],
-        mut record: impl FnMut(usize) -> R,
-    ) -> Vec<([f32; 4], R)> {
-        let prepared = Frame::prepare(self);
-        let mut one = |(index, &(x, y))| {
-            let mut record = record(index);
-            let block = Block::new(Window { x0: x, y0: y, x1: x + 1, y1: y + 1 });
-            let work = block.trace(&prepared.rays, &prepared.direct(), self.image.spp, &mut record);
-            (work.pixels[0], record)
-        };
-        pixels.iter().enumerate().map(&mut one).collect()
-    }
-
     fn checked_window(&self) -> Result<Window, RenderError> {
         let display = (self.image.width, self.image.height);
         let full = Window::full(display);
@@ -254,8 +239,8 @@ impl<'s> Renderer<'s> {
     }
 }
 
-/// One frame with its tree built.
-struct Frame<'s> {
+/// One frame with its tree built: for those who want to look on while parts of it are traced.
+pub struct Frame<'s> {
     plan: Plan<'s>,
     tree: Tree,
     rays: CameraRays,
@@ -267,7 +252,8 @@ struct Frame<'s> {
 }
 
 impl<'s> Frame<'s> {
-    fn prepare(renderer: &Renderer<'s>) -> Self {
+    /// Plans and builds.
+    pub fn prepare(renderer: &Renderer<'s>) -> Self {
         let start = Instant::now();
         let plan = Plan::new(renderer.scene, renderer.camera.eye);
         let parts = plan.parts();
@@ -279,6 +265,22 @@ impl<'s> Frame<'s> {
         let rays = CameraRays::new(renderer.camera, plan.origin, display, image.filter, image.spp, renderer.seed);
         let (max_depth, skip) = (renderer.max_depth, renderer.skip);
         Frame { plan, tree, rays, spp: image.spp, max_depth, skip, plan_seconds, build_seconds }
+    }
+
+    /// What the coordinates of its rays are relative to.
+    pub fn origin(&self) -> DVec3 {
+        self.plan.origin
+    }
+
+    /// Its blocks: windows that are traced as one, of some hundred pixels.
+    pub fn blocks(&self, window: Window) -> Vec<Window> {
+        Block::cover(window).into_iter().map(|block| block.window).collect()
+    }
+
+    /// Traces one block on this thread, as a render does, while a record looks on: its pixels row by row.
+    pub fn trace_block<R: Record>(&self, block: Window, record: &mut R) -> (Vec<[f32; 4]>, RayCounts) {
+        let work = Block::new(block).trace(&self.rays, &self.direct(), self.spp, record);
+        (work.pixels, work.room.rays)
     }
 
     fn direct(&self) -> Direct<'_> {

@@ -9,13 +9,15 @@
 //!   picture H pixels high. Pixels are square, so where width and height differ the angle is the
 //!   vertical one. One row alone has no centres to measure between: the angle is its edges' then.
 //!   `hither` is read and not used. A file without a view has no camera and can only be queried.
-//! - **Lights** have no falloff. NFF's classic shading is `kd x color x cos x strength`; [`Model::Phong`]
+//! - **Lights** have no falloff. NFF's classic shading is `kd x color x cos x strength`; [`Phong`](super::Model::Phong)
 //!   has `E/pi`, so the intensity is pi x strength. A light without a colour has the strength
 //!   `sqrt(n)/2n` for n lights of whatever colour, as SPD suggests; a colour is the strength as it stands.
 //!   The ambient light is `sqrt(n)/2n` too, and none in a file without lights.
 //! - **Sides.** `s`, `c` and `p` are seen from their front alone unless their surface transmits, `pp` from
 //!   both sides, and what has a negative radius from inside alone. Backs still cast shadows.
-//! - **Materials** are named `f1`, `f2`, ... as told beside [`surface::Surfaces`].
+//! - **Materials**: one for each surface and each way it is seen, in the order in which objects use them.
+//!   Surface `i` (from 1, equal ones counted once) is `fi`, and `fi_two_sided` or `fi_inside` where an object
+//!   is seen otherwise than is usual for the surface.
 //! - `c` makes a [`Cylinder`](super::Cylinder) where both radii are equal, else a [`Cone`](super::Cone),
 //!   open at both ends. An apex wider than the base is taken as it stands.
 

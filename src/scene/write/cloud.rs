@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use npyz::{AutoSerialize, WriterBuilder};
 
 use super::text::{Table, list, path, quoted, unsupported};
-use crate::scene::{Cloud, CloudMaterial, CloudShapes, Rows, Scene};
+use crate::scene::{Cloud, CloudMaterial, CloudShapes, Object, Primitive, Rows, Scene};
 
 /// The files of one cloud; which of them exist depends on the cloud.
 #[derive(Debug)]
@@ -41,11 +41,26 @@ const SIZES: &str = "_sizes";
 const COLORS: &str = "_colors";
 const MATERIALS: &str = "_materials";
 
+/// How many clouds, from the first one, are written as single shapes.
+pub(super) fn written_singly(scene: &Scene) -> usize {
+    let turned = |cloud: &Cloud| matches!(&cloud.shapes, CloudShapes::Boxes(_, Some(_)));
+    scene.clouds.iter().rposition(turned).map_or(0, |last| last + 1)
+}
+
+/// The rows of a cloud as single shapes.
+pub(super) fn objects(cloud: &Cloud) -> io::Result<impl Iterator<Item = Object>> {
+    if cloud.colors.is_some() {
+        let why = "a scene file has no key for the colours of a cloud with or before one of turned boxes";
+        return Err(unsupported(why.to_owned()));
+    }
+    Ok((0..cloud.len()).map(|row| {
+        let Primitive { shape, material, .. } = cloud.primitive(row);
+        Object { shape: shape.into_owned(), material, name: cloud.name.clone(), group: cloud.group }
+    }))
+}
+
 pub(super) fn table(scene: &Scene, cloud: &Cloud, files: &Files) -> io::Result<Table> {
     let kind = match &cloud.shapes {
-        CloudShapes::Boxes(_, Some(_)) => {
-            return Err(unsupported("a scene file has no key for a cloud of boxes that are turned".to_owned()));
-        }
         CloudShapes::Spheres(_) => "spheres",
         CloudShapes::Disks(_) => "disks",
         CloudShapes::Boxes(..) => "boxes",
