@@ -82,9 +82,9 @@ impl Reference {
     pub fn verdict(&self, ray: &Ray, got: Option<usize>, got_t: Option<f32>) -> Verdict {
         let expected = self.closest_of(ray, Placed::sees);
         let same = expected.map(|(primitive, _)| primitive) == got;
-        let excused = match (Line::new(ray, true), got) {
-            (Some(line), got) => self.excused(&line, got, got_t),
-            (None, got) => got.is_none(),
+        let excused = match Line::new(ray, true) {
+            Some(line) => self.excused(&line, got, got_t),
+            None => got.is_none(),
         };
         match (same, excused) {
             (true, true) => Verdict::Same,

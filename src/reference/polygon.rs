@@ -19,7 +19,8 @@ pub struct Polygon {
 impl Polygon {
     pub fn new(polygon: &scene::Polygon, origin: DVec3) -> Polygon {
         let corners: Vec<DVec3> = polygon.corners.iter().map(|corner| *corner - origin).collect();
-        let (point, normal) = (corners[0], polygon.normal());
+        // A polygon without corners is no valid one; with a normal of zero it is never met.
+        let (point, normal) = corners.first().map_or_else(Default::default, |first| (*first, polygon.normal()));
         let warp = corners.iter().map(|corner| normal.dot(*corner - point).abs()).fold(0.0, f64::max);
         let plane = Plane { point, normal, warp };
         Polygon { plane, corners, uvs: polygon.uvs.clone(), normals: polygon.normals.clone() }
@@ -48,9 +49,10 @@ impl Polygon {
     /// windings of neighbours add up to that of their union to the last bit: no line slips through
     /// between two polygons that share an edge, whatever the rounding.
     ///
-    /// Source of the count: Alciatore and Miranda, "A winding number and point-in-polygon algorithm",
-    /// 1995; of the antisymmetric product (a + b) x (b - a): Platis and Theoharis, "Fast ray-tetrahedron
-    /// intersection using Plücker coordinates", Journal of Graphics Tools 8(4), 2003.
+    /// The hand is the sign of d . (a x b), the side product of Plücker coordinates, written with
+    /// (a + b) x (b - a) = 2 a x b: this keeps its sign symmetric, and its error is that of one
+    /// distance times the edge instead of two distances. Source of the count: Alciatore and Miranda,
+    /// "A winding number and point-in-polygon algorithm", Colorado State University, 1995.
     fn surrounds(&self, line: &Line) -> bool {
         let (o, d) = (line.origin, line.dir);
         let side_normal = perpendicular(d);

@@ -55,7 +55,7 @@ fn texel(image: &ImageTexture, wrap: [Wrap; 2], i: f64, j: f64) -> DVec3 {
 fn cell(image: &ImageTexture, wrap: [Wrap; 2], i: f64, j: f64) -> usize {
     let index = |k: f64, count: usize, wrap| match wrap {
         Wrap::Repeat => k.rem_euclid(count as f64) as usize,
-        Wrap::Clamp => k.clamp(0.0, count as f64 - 1.0) as usize,
+        Wrap::Clamp => k.min(count as f64 - 1.0).max(0.0) as usize,
     };
     index(j, image.height, wrap[1]) * image.width + index(i, image.width, wrap[0])
 }

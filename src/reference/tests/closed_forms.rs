@@ -162,6 +162,21 @@ fn rays_that_are_none_meet_nothing() {
     }
 }
 
+/// Scenes made by hand may hold what no reader lets through.
+#[test]
+fn bodies_without_extent_are_never_met() {
+    let mut dice = Dice(4);
+    for count in 0..3 {
+        let flat = only(polygon(letter_l()[..count].to_vec()));
+        let inverted = only(Shape::Box(Cuboid { min: DVec3::ONE, max: -DVec3::ONE, rotation: None }));
+        for _ in 0..100 {
+            let ray = ray(3.0 * dice.direction(), dice.direction());
+            assert!(!flat.occluded(&ray) && !inverted.occluded(&ray));
+            assert_eq!(flat.verdict(&ray, None, None), crate::reference::Verdict::Same);
+        }
+    }
+}
+
 #[test]
 fn intervals_are_open_below_and_closed_above() {
     let tracer = only(sphere(DVec3::ZERO, 1.0));
