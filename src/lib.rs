@@ -17,6 +17,6 @@ pub mod shapes;
 mod tracer;
 
 pub use lanes::Ray;
-pub use render::{Progress, Renderer, Rendering};
+pub use render::{Progress, Query, Renderer, Rendering};
 pub use scene::Scene;
 pub use tracer::{Hit, Tracer};
