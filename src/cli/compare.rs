@@ -85,7 +85,7 @@ impl Args {
         };
         let least = |name: &str, value: f64, limit: Option<f64>| {
             let limit = limit.filter(|limit| value.partial_cmp(limit).is_none_or(|order| order.is_lt()))?;
-            Some(format!("{name} is {value:.6}, less than {limit}"))
+            Some(format!("{name} is {value}, less than {limit}"))
         };
         let limits = [
             most("the RMSE", found.rmse, self.max_rmse),

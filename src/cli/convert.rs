@@ -48,7 +48,9 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
         (Some(Kind::Picture), Some(Kind::Picture)) => convert_picture(args, run),
         (Some(Kind::Toml | Kind::Nff), Some(Kind::Toml)) => convert_scene(args, run),
         (Some(Kind::Picture), _) => Err(usage(output, "a picture becomes a picture: should end in .exr or .png")),
-        (_, Some(Kind::Picture)) => Err(usage(output, "a scene becomes a scene (.toml); octray render makes a picture")),
+        (_, Some(Kind::Picture)) => {
+            Err(usage(output, "a scene becomes a scene (.toml); octray render makes a picture"))
+        }
         _ => Err(usage(output, "a scene becomes a scene: should end in .toml")),
     }
 }

@@ -48,7 +48,11 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
     let loaded = scene_file::load(path, run)?;
     scene_file::need_memory(&loaded.scene, 0, "the tree of this scene")?;
     let info = info(path, &loaded.scene, loaded.seconds);
-    if args.json { run.console.print_json(&info)? } else { run.console.print(&page(&info))? }
+    if args.json {
+        run.console.print_json(&info)?
+    } else {
+        run.console.print(&page(&info))?
+    }
     Ok(Exit::Done)
 }
 
@@ -260,7 +264,7 @@ fn page(info: &Value) -> String {
     line("render", format!("{}, depth {}, seed {}", word(&render["integrator"]), render["max_depth"], render["seed"]));
     let bytes = |name: &str| info["memory"][name].as_u64().map_or_else(|| "?".to_owned(), system::size);
     let (columns, tree) = (bytes("column_bytes"), bytes("tree_bytes"));
-    line("memory", format!("columns {columns}, tree {tree}, process at most {}", bytes("peak_bytes")));
+    line("memory", format!("columns {columns}, tree {tree}, {} in all while it was built", bytes("peak_bytes")));
     let seconds = |name: &str| info["seconds"][name].as_f64().unwrap_or(0.0);
     line("time", format!("read in {:.3} s, built in {:.3} s", seconds("load"), seconds("build")));
     page
@@ -273,7 +277,11 @@ fn word(value: &Value) -> String {
 fn vector(value: &Value) -> String {
     let numbers = value.as_array().into_iter().flatten().map(|number| {
         let number = number.as_f64().unwrap_or(f64::NAN);
-        if number != 0.0 && !(1e-3..1e6).contains(&number.abs()) { format!("{number:.4e}") } else { format!("{}", (number * 1e4).round() / 1e4) }
+        if number != 0.0 && !(1e-3..1e6).contains(&number.abs()) {
+            format!("{number:.4e}")
+        } else {
+            format!("{}", (number * 1e4).round() / 1e4)
+        }
     });
     format!("({})", numbers.collect::<Vec<_>>().join(", "))
 }

@@ -39,8 +39,9 @@ impl Target {
                 false => Ok(Target::Stdout),
             };
         }
-        let format = Format::of(path).ok_or_else(|| OutputError::Format { path: path.into() })?;
         run.check_output(path)?;
+        let format = Format::of(path).or_else(|| is_device(path).then_some(Format::Exr));
+        let format = format.ok_or_else(|| OutputError::Format { path: path.into() })?;
         Ok(Target::File(path.into(), format))
     }
 
@@ -93,24 +94,32 @@ pub fn write(
     description: &Description,
     run: &Run,
 ) -> Result<(), Failure> {
-    let losses = match target {
-        Target::File(path, _) => run.signals.undisturbed(|| output::write(path, picture, options, description))?,
+    let encoded = match target.format() {
+        Format::Exr => output::exr::encode(picture, options.float, description),
+        Format::Png => output::png::encode(picture, options.bits, description),
+    };
+    let (bytes, losses) =
+        encoded.map_err(|error| Failure::new(Exit::Output, format!("{target}: cannot be encoded: {error}")))?;
+    match target {
+        Target::File(path, _) => write_bytes(path, &bytes, run)?,
         Target::Stdout => {
-            let encoded = output::exr::encode(picture, options.float, description);
-            let (bytes, losses) = encoded.map_err(|error| Failure::new(Exit::Output, error))?;
             let mut out = io::stdout().lock();
             let written = out.write_all(&bytes).and_then(|()| out.flush());
             written.map_err(|error| Failure::output(Path::new("standard output"), &error))?;
-            losses
         }
-    };
+    }
     tell(losses, target, run);
     Ok(())
 }
 
-/// Writes other bytes whole, or not at all.
+/// Whether a name is that of a device or pipe and says no format: such a one takes EXR, as standard output does.
+fn is_device(path: &Path) -> bool {
+    path.extension().is_none() && std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
+}
+
+/// Writes bytes whole, or not at all.
 pub fn write_bytes(path: &Path, bytes: &[u8], run: &Run) -> Result<(), Failure> {
-    Ok(run.signals.undisturbed(|| aside::write(path, bytes))?)
+    Ok(run.signals.undisturbed(|| aside::write_while(path, bytes, || !run.signals.is_caught()))?)
 }
 
 /// A PNG clamps bright light by its nature; everything else is worth a word.

@@ -140,10 +140,8 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
 
 impl Args {
     fn renderer<'s>(&self, scene: &'s octray::Scene) -> Result<Renderer<'s>, Failure> {
-        let mut renderer = Renderer::new(scene)?
-            .threads(self.threads.count())
-            .skip(!self.no_skip)
-            .engine(Engine::from(self.engine));
+        let mut renderer =
+            Renderer::new(scene)?.threads(self.threads.count()).skip(!self.no_skip).engine(Engine::from(self.engine));
         if let Some(name) = &self.camera {
             renderer = renderer.camera(name)?;
         }
@@ -210,7 +208,7 @@ fn summary(rendering: &Rendering, spp: u32, target: &Target, run: &Run) -> Strin
         window.height(),
         millions / seconds.max(1e-9),
         run.start.elapsed().as_secs_f64(),
-        system::peak_bytes().map_or_else(|| "done".to_owned(), system::size),
+        system::peak_bytes().map_or_else(|| "done".to_owned(), |bytes| format!("{} of memory", system::size(bytes))),
     )
 }
 
@@ -220,7 +218,8 @@ mod tests {
 
     #[test]
     fn the_usual_output_is_named_after_the_scene() {
-        let names = ["scenes/fig5.toml", "balls.nff.gz", "../a.b.nff", "odd"].map(|name| default_output(Path::new(name)));
+        let names =
+            ["scenes/fig5.toml", "balls.nff.gz", "../a.b.nff", "odd"].map(|name| default_output(Path::new(name)));
         assert_eq!(names.map(|name| name.display().to_string()), ["fig5.exr", "balls.exr", "a.b.exr", "odd.exr"]);
     }
 }

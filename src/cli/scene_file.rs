@@ -4,15 +4,19 @@ use std::path::Path;
 use std::time::Instant;
 
 use octray::Scene;
-use octray::scene::{Filter, ImageSettings, SceneErrors};
+use octray::scene::{CloudShapes, Filter, ImageSettings, SceneErrors, Shape};
 
 use super::Run;
 use super::exit::{Exit, Failure};
 use super::system;
 
-/// Memory that a build takes for each primitive on top of the scene, in bytes: parts, boxes, tree and columns
-/// together at their most (measured on a million spheres and on a million triangles, rounded up).
-const BUILD_BYTES: u64 = 800;
+/// Memory that a build takes for a sphere on top of the scene, in bytes: parts, boxes, tree and columns
+/// together at their most (measured on a million: 360).
+const SPHERE_BYTES: usize = 400;
+/// The same for a corner of a polygon (measured on a million triangles: 185).
+const CORNER_BYTES: usize = 200;
+/// The same for every other primitive (measured on a million disks: 420).
+const OTHER_BYTES: usize = 600;
 /// Samples per pixel of a scene without an image, as in scene files.
 const SPP: u32 = 16;
 
@@ -32,10 +36,20 @@ pub fn load(path: &Path, run: &Run) -> Result<Loaded, Failure> {
     Ok(Loaded { scene, seconds: start.elapsed().as_secs_f64() })
 }
 
-/// Makes sure that a tree can be built.
+/// Makes sure that a tree can be built, and so many bytes more taken.
 pub fn need_memory(scene: &Scene, more: u64, work: &str) -> Result<(), Failure> {
-    let build = BUILD_BYTES.saturating_mul(scene.primitive_count() as u64);
-    system::need_memory(build.saturating_add(more), work)
+    let objects = scene.objects.iter().map(|object| match &object.shape {
+        Shape::Sphere(_) => SPHERE_BYTES,
+        Shape::Polygon(polygon) => CORNER_BYTES * polygon.corners.len(),
+        Shape::Plane(_) | Shape::Disk(_) | Shape::Box(_) | Shape::Cylinder(_) | Shape::Cone(_) => OTHER_BYTES,
+    });
+    let clouds = scene.clouds.iter().map(|cloud| match &cloud.shapes {
+        CloudShapes::Spheres(rows) => SPHERE_BYTES * rows.len(),
+        CloudShapes::Polygons { corners, .. } => CORNER_BYTES * corners.len(),
+        CloudShapes::Disks(_) | CloudShapes::Boxes(..) => OTHER_BYTES * cloud.len(),
+    });
+    let build: usize = objects.chain(clouds).sum();
+    system::need_memory((build as u64).saturating_add(more), work)
 }
 
 /// Gives the picture another size, or a scene without a picture its first.
@@ -45,8 +59,12 @@ pub fn resize(scene: &mut Scene, resolution: Option<(u32, u32)>) {
     scene.image = Some(ImageSettings { width, height, ..image });
 }
 
-/// All errors with the lines they are in.
+/// All errors with the lines they are in; where a file as a whole is wrong, one line.
 fn failure(path: &Path, errors: &SceneErrors, color: bool) -> Failure {
+    let lone = errors.iter().next().filter(|error| errors.len() == 1 && error.span.is_none());
+    if let Some(error) = lone {
+        return Failure::new(Exit::Input, error);
+    }
     let count = match errors.len() {
         1 => "1 mistake".to_owned(),
         more => format!("{more} mistakes"),
