@@ -121,7 +121,7 @@ penumbra = 5
 
 [[groups]]
 name = "table"
-translation = [10, 0, 0]
+translate = [10, 0, 0]
 rotation = { axis = [0, 3, 0], angle = 90 }
 scale = 2
 
@@ -415,7 +415,8 @@ fn defaults_are_the_documented_ones() {
 /// All shapes twice, plain and in a group: each point and normal must be the plain one, moved by hand.
 #[test]
 fn groups_scale_then_turn_then_move() {
-    let group = "[[groups]]\nname = \"g\"\nscale = 2\nrotation = { axis = [0, 0, 1], angle = 90 }\ntranslation = [10, 20, 30]\n";
+    let group =
+        "[[groups]]\nname = \"g\"\nscale = 2\nrotation = { axis = [0, 0, 1], angle = 90 }\ntranslate = [10, 20, 30]\n";
     let shapes = [
         "sphere\"\ncenter = [1, 2, 3]\nradius = 4",
         "plane\"\npoint = [1, 2, 3]\nnormal = [1, 0, 0]",
@@ -685,7 +686,7 @@ proptest! {
 
     #[test]
     fn any_change_of_an_array_or_picture_is_read_or_refused(
-        file in prop::sample::select(&FILES[..]),
+        file in prop::sample::select(FILES),
         edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
         cut in prop::option::of(any::<prop::sample::Index>()),
     ) {

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::lanes::{Float8, LANES, Mask8, RayPacket, Vec3x8, float8};
+use crate::lanes::{LANES, Mask8, RayPacket, Vec3x8, float8};
 use crate::sample::{self, dimension};
 use crate::scene::{Camera, Filter, FilterTable, Lens};
 
@@ -49,20 +49,25 @@ impl CameraRays {
         sample::pixel_key(self.seed, x, y)
     }
 
-    /// Eight rays: pixel, its key and sample index by lane; lanes from `count` on are dead.
-    pub fn packet(&self, pixels: &[(i32, i32, u32, u32); LANES], count: usize) -> RayPacket {
-        let (mut dirs, mut origins) = ([[0.0; 3]; LANES], [[0.0; 3]; LANES]);
-        for (lane, &(x, y, key, index)) in pixels.iter().enumerate() {
+    /// Eight rays in f64: pixel, its key and sample index by lane.
+    #[inline(always)]
+    pub fn exact(&self, samples: &[(i32, i32, u32, u32); LANES]) -> [(DVec3, DVec3); LANES] {
+        samples.map(|(x, y, key, index)| {
             let (x, y) = self.point(x, y, key, index);
-            let at = |base: &[DVec3; 3]| (base[0] + base[1] * x + base[2] * y).as_vec3().to_array();
-            (dirs[lane], origins[lane]) = (at(&self.dir), at(&self.origin));
-        }
+            let at = |base: &[DVec3; 3]| base[0] + base[1] * x + base[2] * y;
+            (at(&self.origin), at(&self.dir))
+        })
+    }
+
+    /// The same rounded; lanes from `count` on are dead.
+    #[inline(always)]
+    pub fn packet(&self, exact: &[(DVec3, DVec3); LANES], count: usize) -> RayPacket {
         let live = Mask8::from_bits((1u32 << count) - 1);
         let origin = match self.common_origin() {
             Some(origin) => Vec3x8::splat(origin),
-            None => Vec3x8::from_fn(|i| origins[i]),
+            None => Vec3x8::from_fn(|i| exact[i].0.as_vec3().to_array()),
         };
-        RayPacket::new(origin, Vec3x8::from_fn(|i| dirs[i]), float8(f32::INFINITY), live)
+        RayPacket::new(origin, Vec3x8::from_fn(|i| exact[i].1.as_vec3().to_array()), float8(f32::INFINITY), live)
     }
 
     #[inline(always)]
@@ -75,5 +80,3 @@ impl CameraRays {
         (center.0 + self.filter.offset(a), center.1 + self.filter.offset(b))
     }
 }
-
-const _: () = assert!(size_of::<Float8>() == 4 * LANES);

@@ -1,10 +1,14 @@
 //! From rays to radiance, a tile at a time.
 
+mod branches;
 mod camera;
 mod direct;
+mod hits;
+mod lights;
 mod record;
 mod wave;
 
 pub use self::camera::CameraRays;
 pub use self::direct::{Direct, Room, Samples};
 pub use self::record::{RayCounts, RayKind, Record, Silent};
+pub use self::wave::ExactRays;

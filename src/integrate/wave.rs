@@ -1,8 +1,10 @@
 //! Rays of one kind and depth that are traced together.
 
+use glam::DVec3;
+
 use super::record::RayKind;
 use crate::accel::{PACKETS, Tile};
-use crate::lanes::{Float8, LANES, Mask8, Ray, RayPacket, Vec3x8, float8};
+use crate::lanes::{LANES, Mask8, Ray, RayPacket, Vec3x8, float8};
 
 /// Up to 64 rays, what each of them stands for, and what of it reaches the pixel.
 pub struct Wave {
@@ -15,13 +17,20 @@ pub struct Wave {
     pub slots: Option<[[u8; LANES]; PACKETS]>,
     /// How each ray came about.
     pub paths: [[u32; LANES]; PACKETS],
+    /// The rays before they were rounded, where rays go on from what they meet.
+    pub exact: Option<Box<ExactRays>>,
 }
+
+/// Origins and directions of 64 rays in f64.
+pub type ExactRays = [[(DVec3, DVec3); LANES]; PACKETS];
 
 /// A ray to be traced later.
 #[derive(Debug, Clone, Copy)]
 pub struct Branch {
+    /// Off the surface, for f32.
     pub origin: [f32; 3],
-    pub dir: [f32; 3],
+    /// On the surface, and where to from there.
+    pub exact: (DVec3, DVec3),
     pub weight: [f32; 3],
     pub slot: u8,
     pub path: u32,
@@ -29,9 +38,9 @@ pub struct Branch {
 
 impl Wave {
     /// Camera rays.
-    pub fn camera(tile: Tile) -> Self {
+    pub fn camera(tile: Tile, exact: Option<Box<ExactRays>>) -> Self {
         let weight = [Vec3x8::splat([1.0; 3]); PACKETS];
-        Wave { tile, kind: RayKind::Camera, depth: 1, weight, slots: None, paths: [[1; LANES]; PACKETS] }
+        Wave { tile, kind: RayKind::Camera, depth: 1, weight, slots: None, paths: [[1; LANES]; PACKETS], exact }
     }
 
     /// Up to 64 later rays.
@@ -40,12 +49,14 @@ impl Wave {
         let ray = |p: usize, f: fn(&Branch) -> [f32; 3], fill| Vec3x8::from_fn(|i| lane(p, i).map_or(fill, f));
         let packet = |p: usize| {
             let live = Mask8::from_bits((0..LANES).filter(|i| lane(p, *i).is_some()).map(|i| 1 << i).sum());
-            let (origin, dir) = (ray(p, |b| b.origin, [0.0; 3]), ray(p, |b| b.dir, [1.0; 3]));
+            let (origin, dir) = (ray(p, |b| b.origin, [0.0; 3]), ray(p, |b| b.exact.1.as_vec3().to_array(), [1.0; 3]));
             RayPacket::new(origin, dir, float8(f32::INFINITY), live)
         };
         let number = |f: fn(&Branch) -> u32| -> [[u32; LANES]; PACKETS] {
             std::array::from_fn(|p| std::array::from_fn(|i| lane(p, i).map_or(0, f)))
         };
+        let exact =
+            std::array::from_fn(|p| std::array::from_fn(|i| lane(p, i).map_or((DVec3::ZERO, DVec3::ONE), |b| b.exact)));
         Wave {
             tile: Tile::new(std::array::from_fn(packet), None),
             kind,
@@ -53,6 +64,7 @@ impl Wave {
             weight: std::array::from_fn(|p| ray(p, |b| b.weight, [0.0; 3])),
             slots: Some(number(|b| u32::from(b.slot)).map(|slots| slots.map(|slot| slot as u8))),
             paths: number(|b| b.path),
+            exact: Some(Box::new(exact)),
         }
     }
 
@@ -77,5 +89,3 @@ pub fn lanes(mut mask: u32) -> impl Iterator<Item = usize> {
         lane
     })
 }
-
-const _: () = assert!(size_of::<Float8>() == 4 * LANES);

@@ -9,7 +9,7 @@ use glam::DVec3;
 pub use self::parts::{
     BoxPart, ConePart, CylinderPart, DiskPart, Kind, Owner, Parts, PlanePart, PolygonPart, SpherePart, TurnedBoxPart,
 };
-use crate::scene::{Material, Object, Scene, Shape, Visible};
+use crate::scene::{CloudMaterial, Material, Object, Scene, Shape, Visible};
 
 /// Decisions about one scene seen from one origin.
 #[derive(Debug)]
@@ -25,6 +25,23 @@ pub struct Plan<'s> {
     pub colored: bool,
     /// Some polygon has normals.
     pub smooth: bool,
+    /// Rays go on from some material: hits are found again in f64, since curved mirrors multiply rounding.
+    pub scatters: bool,
+}
+
+/// Materials that some primitive shows, their backs among them.
+fn used_materials(scene: &Scene) -> Vec<usize> {
+    let mut used = vec![false; scene.materials.len()];
+    scene.objects.iter().for_each(|object| used[object.material] = true);
+    for cloud in &scene.clouds {
+        match &cloud.material {
+            CloudMaterial::One(material) => used[*material] = true,
+            CloudMaterial::Each(materials) => materials.iter().for_each(|material| used[*material as usize] = true),
+        }
+    }
+    let backs: Vec<usize> = (0..used.len()).filter(|i| used[*i]).filter_map(|i| scene.materials[i].back).collect();
+    backs.into_iter().for_each(|back| used[back] = true);
+    (0..used.len()).filter(|i| used[*i]).collect()
 }
 
 impl<'s> Plan<'s> {
@@ -37,7 +54,8 @@ impl<'s> Plan<'s> {
             _ => false,
         };
         let smooth = scene.objects.iter().any(has_normals);
-        Plan { scene, origin, visible, colored, smooth }
+        let scatters = used_materials(scene).iter().any(|index| scene.materials[*index].model.scatters());
+        Plan { scene, origin, visible, colored, smooth, scatters }
     }
 
     /// All parts of the scene, relative to the origin.

@@ -67,7 +67,7 @@ mod tests {
     fn star(points: usize, inner: f64) -> Vec<DVec3> {
         let corner = |k: usize| {
             let angle = k as f64 * std::f64::consts::PI / points as f64;
-            let r = if k % 2 == 0 { 1.0 } else { inner };
+            let r = if k.is_multiple_of(2) { 1.0 } else { inner };
             DVec3::new(r * angle.cos(), r * angle.sin(), 3.0)
         };
         (0..2 * points).map(corner).collect()

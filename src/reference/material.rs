@@ -79,7 +79,7 @@ impl Side {
         if self.n == self.n_g {
             return 1.0;
         }
-        let x = (self.n_g.dot(wi) / (self.n.dot(wi) * self.n.dot(self.n_g))).min(1.0);
+        let x = (self.n_g.dot(wi) / (self.n.dot(wi) * self.n.dot(self.n_g))).clamp(0.0, 1.0);
         x * (1.0 + x * (1.0 - x))
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::accel::{PACKETS, Tile};
 use crate::film::{Picture, Window};
-use crate::integrate::{CameraRays, Direct, RayKind, Record, Room, Samples};
+use crate::integrate::{CameraRays, Direct, ExactRays, RayKind, Record, Room, Samples};
 use crate::lanes::LANES;
 
 /// Pixels along an edge.
@@ -55,7 +55,8 @@ impl Block {
                 record.tile(&mut pending.samples());
             }
             let met = room.rays.hits[RayKind::Camera as usize];
-            let samples = direct.radiance(pending.tile(rays), room, record);
+            let (tile, exact) = pending.rays(rays, direct.scatters());
+            let samples = direct.radiance(tile, exact, room, record);
             pending.add_to(&samples, &mut sums);
             tiles += 1;
             background_tiles += u64::from(room.rays.hits[RayKind::Camera as usize] == met);
@@ -114,9 +115,11 @@ impl Pending {
         self.samples.iter().flatten().take(self.count).map(|&(x, y, _, sample)| (x, y, sample))
     }
 
-    fn tile(&self, rays: &CameraRays) -> Tile {
+    fn rays(&self, rays: &CameraRays, keep_exact: bool) -> (Tile, Option<Box<ExactRays>>) {
         let count = |p: usize| self.count.saturating_sub(p * LANES).min(LANES);
-        Tile::new(std::array::from_fn(|p| rays.packet(&self.samples[p], count(p))), rays.common_origin())
+        let exact: ExactRays = std::array::from_fn(|p| rays.exact(&self.samples[p]));
+        let packets = std::array::from_fn(|p| rays.packet(&exact[p], count(p)));
+        (Tile::new(packets, rays.common_origin()), keep_exact.then(|| Box::new(exact)))
     }
 
     fn add_to(&self, samples: &Samples, sums: &mut [[f64; 4]]) {

@@ -15,6 +15,8 @@ use miette::{Diagnostic, GraphicalReportHandler, GraphicalTheme, LabeledSpan, Na
 
 /// Errors kept of one load; a broken file of a million rows is not shown a million times.
 const MOST_ERRORS: usize = 100;
+/// Longest line of a snippet, in bytes.
+const LONGEST_LINE: usize = 240;
 /// Longest part of a value that a message repeats, in characters.
 const LONGEST_QUOTE: usize = 60;
 
@@ -145,6 +147,17 @@ impl Source {
         SceneError { place, rule: rule.into(), found: found.into(), help: None, span: Some(span) }
     }
 
+    /// Whether a line and its neighbours are short enough to be shown.
+    fn fits_a_screen(&self, line: usize) -> bool {
+        (line.saturating_sub(1)..=line + 1).all(|line| self.line(line).len() <= LONGEST_LINE)
+    }
+
+    /// The part of a span that is on its first line: a list of a thousand points is marked where it starts.
+    fn first_line_of(&self, span: Range<usize>) -> Range<usize> {
+        let line = self.line(self.place(span.start).line);
+        span.start..span.end.min(line.end.max(span.start))
+    }
+
     fn named(&self) -> NamedSource<Arc<str>> {
         NamedSource::new(self.path.display().to_string(), self.text.clone())
     }
@@ -219,11 +232,14 @@ impl SceneErrors {
         let mut page = String::new();
         for error in &self.errors {
             let source = self.sources.iter().find(|source| source.path() == error.place.path);
-            let snippet = Snippet { error, source: source.map(Source::named) };
+            let source = source.filter(|source| source.fits_a_screen(error.place.line));
+            let span = error.span.clone().zip(source).map(|(span, source)| source.first_line_of(span));
+            let snippet = Snippet { error, span, source: source.map(Source::named) };
             // Writing to a string cannot fail; should the span not fit its text, the line alone must do.
             if handler.render_report(&mut page, &snippet).is_err() {
                 page.push_str(&format!("{error}\n"));
             }
+            page.push('\n');
         }
         if self.more > 0 {
             page.push_str(&format!("and {} more errors\n", self.more));
@@ -236,6 +252,7 @@ impl SceneErrors {
 #[derive(Debug)]
 struct Snippet<'a> {
     error: &'a SceneError,
+    span: Option<Range<usize>>,
     source: Option<NamedSource<Arc<str>>>,
 }
 
@@ -245,13 +262,12 @@ impl Diagnostic for Snippet<'_> {
     }
 
     fn source_code(&self) -> Option<&dyn SourceCode> {
-        self.error.span.as_ref()?;
+        self.span.as_ref()?;
         self.source.as_ref().map(|source| source as &dyn SourceCode)
     }
 
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        let span = self.error.span.clone()?;
-        self.source.as_ref()?;
+        let span = self.span.clone()?;
         Some(Box::new(std::iter::once(LabeledSpan::new_with_span(Some("here".to_owned()), span))))
     }
 }
@@ -337,6 +353,19 @@ mod tests {
             assert!(report.contains(part), "{part} is missing from\n{report}");
         }
         assert!(!report.contains('\u{1b}') && errors.report(true).contains('\u{1b}'));
+    }
+
+    #[test]
+    fn long_lines_and_long_lists_make_short_reports() {
+        let text = format!("corners = [\n{}]\nradius = {}\n", "[0, 0, 0],\n".repeat(1000), "9".repeat(10_000));
+        let source = Source::new(Path::new("a.toml"), &text);
+        let mut errors = SceneErrors::default();
+        errors.push(source.error(10..text.len() - 10_011, "polygon must have an area", ""));
+        errors.push(source.error(text.len() - 10_001..text.len() - 1, "sphere radius must be finite", ""));
+        errors.add_source(&source);
+        let report = errors.report(false);
+        assert!(report.contains("corners = [") && report.contains("1003:10"), "{report}");
+        assert!(report.len() < 1000, "{report}");
     }
 
     #[test]

@@ -10,9 +10,9 @@
 //! (`r . n_g <= 0`), it is bent back: `r - (r . n_g) n_g` is moved up by 1e-3 |d| along `n_g`.
 //! Refraction is by Snell's law with `n`, total reflection included; the ratio is 1 to `ior` on the
 //! front and `ior` to 1 on the back. `n` is the interpolated normal turned to the side of `n_g`; where
-//! it faces away from the viewer all the same, Snell and Fresnel take `-n`. With interpolated normals the light's cosine is multiplied by
-//! `g(x) = x (1 + x (1 - x))`, `x = min(1, (n_g . wi) / ((n . wi) (n . n_g)))`: Chiang, Li and
-//! Burley, "Taming the shadow terminator", SIGGRAPH 2019 talks.
+//! it faces away from the viewer all the same, Snell and Fresnel take `-n`. With interpolated normals
+//! the light's cosine is multiplied by `g(x) = x (1 + x (1 - x))`, where x is
+//! `(n_g . wi) / ((n . wi) (n . n_g))` held in 0..1: Chiang, Li and Burley, "Taming the shadow terminator", SIGGRAPH 2019 talks.
 
 use glam::DVec3;
 

@@ -97,19 +97,17 @@ pub struct Primitive<'a> {
 pub const SCHEMA: &str = include_str!("schema.json");
 
 impl Scene {
-    /// Reads a scene file, its kind by its name: `.toml`, `.nff` or `.nff.gz`; with all files that it names.
+    /// Reads a scene file, its kind by its extension: `.toml` with all files that it names, `.nff`, `.nff.gz`.
     ///
     /// # Errors
     /// All mistakes of all files; each with its place.
     pub fn load(path: impl AsRef<Path>) -> Result<Scene, SceneErrors> {
         let path = path.as_ref();
-        let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
-        if name.ends_with(".toml") {
-            toml::load(path)
-        } else if name.ends_with(".nff") || name.ends_with(".nff.gz") {
-            nff::load(path)
-        } else {
-            Err(SceneError::of_file(path, "a scene file must end in .toml, .nff or .nff.gz", "").into())
+        let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+        match extension.as_deref() {
+            Some("toml") => toml::load(path),
+            Some("nff" | "gz") => nff::load(path),
+            _ => Err(SceneError::of_file(path, "a scene file must end in .toml, .nff or .nff.gz", "").into()),
         }
     }
 

@@ -123,12 +123,9 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// The format that this version reads is 1.
+/// The format that this version reads is 1, which a file without the key has.
 fn read_format(root: &Table<'_>) {
-    let Some(item) = root.item("format") else {
-        root.missing::<()>("\"format\": start it with format = 1");
-        return;
-    };
+    let Some(item) = root.item("format") else { return };
     if item.value.as_integer().is_none_or(|format| format.as_str() != "1") {
         item.wrong::<()>("must be 1, the only one that this version reads");
     }

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::cylinder::about_axis;
 use super::sphere::copysign;
-use super::{Hidden8, Ray64, Sides, Store, Surface8, column_of, roundings};
+use super::{Hidden8, Ray64, Sides, Store, Surface8, Surface64, column_of, nearer, roundings};
 use crate::lanes::{Column, Column3, Float8, Hit8, LANES, Mask8, RayPacket, Vec3x8, difference_of_products, float8};
 use crate::plan::{ConePart, Owner};
 use crate::scene::Visible;
@@ -138,27 +138,27 @@ impl Store for Cones {
     }
 
     fn decide(part: &ConePart, ray: &Ray64, visible: Visible) -> Option<f64> {
-        let k = part.slope();
-        let g = ray.origin - part.base;
-        let (gw, dw) = (g.dot(part.axis), ray.dir.dot(part.axis));
-        let (gx, dx) = (g - part.axis * gw, ray.dir - part.axis * dw);
-        let rho = part.radius + k * gw;
-        let a = dx.length_squared() - (k * dw).powi(2);
-        let b = dx.dot(gx) - k * dw * rho;
-        let c = gx.length_squared() - rho * rho;
-        let disc = b * b - a * c;
-        if disc < 0.0 {
-            return None;
-        }
-        let z = -(b + disc.sqrt().copysign(b));
-        let mut roots = [z / a, c / z];
+        let Quadratic { a, b, disc, mut roots } = Quadratic::new(part, ray);
         roots.sort_by(f64::total_cmp);
         let keep = |t: &f64| {
             let enters = a * t + b < 0.0;
             let shown = visible == Visible::Both || enters == (visible == Visible::Front);
-            shown && ray.accepts(*t) && (0.0..=part.height).contains(&(gw + t * dw))
+            let w = (ray.at(*t) - part.base).dot(part.axis);
+            shown && ray.accepts(*t) && (0.0..=part.height).contains(&w)
         };
-        roots.into_iter().find(keep)
+        roots.into_iter().find(keep).filter(|_| disc >= 0.0)
+    }
+
+    fn refine(part: &ConePart, ray: &Ray64, t: f64) -> Surface64 {
+        let Quadratic { roots: [a, b], .. } = Quadratic::new(part, ray);
+        let t = nearer(a, b, t);
+        let from_base = ray.at(t) - part.base;
+        let w = from_base.dot(part.axis);
+        // At the tip there is no radial direction; the axis stands in for it.
+        let radial = (from_base - part.axis * w).try_normalize();
+        let normal = (radial.unwrap_or(part.axis) - part.axis * part.slope()).normalize();
+        let rho = (part.radius + part.slope() * w).max(0.0);
+        Surface64 { t, point: part.base + part.axis * w + radial.unwrap_or_default() * rho, normal }
     }
 
     fn surface(row: &Row, rays: &RayPacket, t: Float8) -> Surface8 {
@@ -203,5 +203,31 @@ impl Store for Cones {
     fn column_bytes(&self) -> usize {
         let scalars = [&self.height, &self.radius, &self.slope];
         self.base.bytes() + self.axis.bytes() + scalars.iter().map(|column| column.bytes()).sum::<usize>()
+    }
+}
+
+/// `A t^2 + 2 B t + C = 0` in f64, from the point nearest the base, which is added back to the roots.
+struct Quadratic {
+    /// With `b`: `a t + b` is negative where a root at `t` enters.
+    a: f64,
+    b: f64,
+    disc: f64,
+    roots: [f64; 2],
+}
+
+impl Quadratic {
+    fn new(part: &ConePart, ray: &Ray64) -> Self {
+        let k = part.slope();
+        let p = (part.base - ray.origin).dot(ray.dir) / ray.dir.length_squared();
+        let g = ray.at(p) - part.base;
+        let (gw, dw) = (g.dot(part.axis), ray.dir.dot(part.axis));
+        let (gx, dx) = (g - part.axis * gw, ray.dir - part.axis * dw);
+        let rho = part.radius + k * gw;
+        let a = dx.length_squared() - (k * dw).powi(2);
+        let b = dx.dot(gx) - k * dw * rho;
+        let c = gx.length_squared() - rho * rho;
+        let disc = b * b - a * c;
+        let z = -(b + disc.max(0.0).sqrt().copysign(b));
+        Quadratic { a, b: b - a * p, disc, roots: [p + z / a, p + c / z] }
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{Hidden8, Ray64, Sides, Store, Surface8, roundings};
+use super::{Hidden8, Ray64, Sides, Store, Surface8, Surface64, nearer, roundings};
 use crate::lanes::{Column3, Float8, Hit8, LANES, Mask8, RayPacket, Vec3x8, float8};
 use crate::plan::{BoxPart, Owner};
 use crate::scene::Visible;
@@ -76,6 +76,13 @@ impl Store for Boxes {
     fn decide(part: &BoxPart, ray: &Ray64, visible: Visible) -> Option<f64> {
         let (entry, exit) = slabs64(part.min - ray.origin, part.max - ray.origin, ray.dir);
         (entry <= exit).then(|| ray.first(entry, exit, visible)).flatten()
+    }
+
+    fn refine(part: &BoxPart, ray: &Ray64, t: f64) -> Surface64 {
+        let (entry, exit) = slabs64(part.min - ray.origin, part.max - ray.origin, ray.dir);
+        let t = nearer(entry, exit, t);
+        let (point, normal) = face64(part.min, part.max, ray.at(t));
+        Surface64 { t, point, normal }
     }
 
     #[inline(always)]
@@ -175,6 +182,18 @@ pub(super) fn face(min: Vec3x8, max: Vec3x8, point: Vec3x8) -> (Vec3x8, Vec3x8) 
     let zero = Float8::ZERO;
     let normal = Vec3x8::new(on_x.select(x.2, zero), on_y.select(y.2, zero), on_z.select(z.2, zero));
     let point = Vec3x8::new(on_x.select(x.1, point.x), on_y.select(y.1, point.y), on_z.select(z.1, point.z));
+    (point, normal)
+}
+
+/// [`face`] in f64.
+pub(super) fn face64(min: DVec3, max: DVec3, mut point: DVec3) -> (DVec3, DVec3) {
+    let (below, above) = ((point - min).abs(), (point - max).abs());
+    let gap = below.min(above);
+    let axis = (0..3).fold(0, |best, k| if gap[k] < gap[best] { k } else { best });
+    let low = below[axis] <= above[axis];
+    point[axis] = if low { min[axis] } else { max[axis] };
+    let mut normal = DVec3::ZERO;
+    normal[axis] = if low { -1.0 } else { 1.0 };
     (point, normal)
 }
 

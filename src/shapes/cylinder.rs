@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 
 use super::sphere::copysign;
-use super::{Hidden8, Ray64, Sides, Store, Surface8, column_of, roundings};
+use super::{Hidden8, Ray64, Sides, Store, Surface8, Surface64, column_of, nearer, roundings};
 use crate::lanes::{Column, Column3, Float8, Hit8, LANES, Mask8, RayPacket, Vec3x8};
 use crate::plan::{CylinderPart, Owner};
 use crate::scene::{Visible, basis};
@@ -116,22 +116,23 @@ impl Store for Cylinders {
     }
 
     fn decide(part: &CylinderPart, ray: &Ray64, visible: Visible) -> Option<f64> {
-        let across = |v: DVec3| v - part.axis * v.dot(part.axis);
-        let f = part.base - ray.origin;
-        let (f2, d2) = (across(f), across(ray.dir));
-        let (fd, dd) = (f2.dot(d2), d2.length_squared());
-        let disc = part.radius * part.radius * dd - f2.cross(d2).length_squared();
-        if disc < 0.0 {
-            return None;
-        }
-        let z = fd + disc.sqrt().copysign(fd);
-        let (a, b) = (z / dd, (f2.length() - part.radius) * (f2.length() + part.radius) / z);
+        let (disc, [a, b]) = roots(part, ray);
         let keep = |t: &f64| {
-            let w = (t * ray.dir - f).dot(part.axis);
+            let w = (ray.at(*t) - part.base).dot(part.axis);
             (0.0..=part.height).contains(&w) && ray.accepts(*t)
         };
         let entry = Some(a.min(b)).filter(keep).filter(|_| visible != Visible::Back);
-        entry.or_else(|| Some(a.max(b)).filter(keep).filter(|_| visible != Visible::Front))
+        let first = entry.or_else(|| Some(a.max(b)).filter(keep).filter(|_| visible != Visible::Front));
+        first.filter(|_| disc >= 0.0)
+    }
+
+    fn refine(part: &CylinderPart, ray: &Ray64, t: f64) -> Surface64 {
+        let (_, [a, b]) = roots(part, ray);
+        let t = nearer(a, b, t);
+        let from_base = ray.at(t) - part.base;
+        let w = from_base.dot(part.axis);
+        let normal = (from_base - part.axis * w).normalize();
+        Surface64 { t, point: part.base + part.axis * w + normal * part.radius, normal }
     }
 
     fn surface(row: &Row, rays: &RayPacket, t: Float8) -> Surface8 {
@@ -169,6 +170,17 @@ impl Store for Cylinders {
     fn column_bytes(&self) -> usize {
         self.base.bytes() + self.axis.bytes() + self.height.bytes() + self.radius.bytes()
     }
+}
+
+/// The sphere's quadratic across the axis: its discriminant, and both roots (of a tangent where it is
+/// negative).
+fn roots(part: &CylinderPart, ray: &Ray64) -> (f64, [f64; 2]) {
+    let across = |v: DVec3| v - part.axis * v.dot(part.axis);
+    let (f, d) = (across(part.base - ray.origin), across(ray.dir));
+    let (fd, dd) = (f.dot(d), d.length_squared());
+    let disc = part.radius * part.radius * dd - f.cross(d).length_squared();
+    let z = fd + disc.max(0.0).sqrt().copysign(fd);
+    (disc, [z / dd, (f.length() - part.radius) * (f.length() + part.radius) / z])
 }
 
 /// u = azimuth/2pi in the basis of the axis, v = share of the height.

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
-use super::plane::{flat_surface, shows, side_hidden};
-use super::{Hidden8, Ray64, Sides, Store, Surface8, column_of, roundings};
+use super::plane::{flat_surface, flat_surface64, shows, side_hidden};
+use super::{Hidden8, Ray64, Sides, Store, Surface8, Surface64, column_of, roundings};
 use crate::lanes::{Column, Column3, Float8, Hit8, LANES, Mask8, RayPacket, Vec3x8};
 use crate::plan::{DiskPart, Owner};
 use crate::scene::{Visible, basis};
@@ -126,6 +126,10 @@ impl Store for Disks {
         let rho = (t * ray.dir - f).length();
         let bound = 8.0 * f64::EPSILON * (f.length() * (1.0 + ray.dir.length() / nd.abs()) + part.radius);
         (rho <= part.radius + bound && rho >= part.inner - bound).then_some(t)
+    }
+
+    fn refine(part: &DiskPart, ray: &Ray64, _: f64) -> Surface64 {
+        flat_surface64(part.center, part.normal, ray)
     }
 
     #[inline(always)]

@@ -57,6 +57,8 @@ pub trait Store: Sized + Sync {
     fn hit<const CULL: bool>(anchor: &Self::Anchor, rays: &RayPacket) -> Hit8;
     /// The f64 answer where the kernel is in doubt: touching counts as a hit.
     fn decide(part: &Self::Part, ray: &Ray64, visible: Visible) -> Option<f64>;
+    /// The hit near `t` again, in f64.
+    fn refine(part: &Self::Part, ray: &Ray64, t: f64) -> Surface64;
     /// Where the rays are at `t`, put on the surface.
     fn surface(row: &Self::Row, rays: &RayPacket, t: Float8) -> Surface8;
     /// Texture coordinates of one hit point on one part.
@@ -80,6 +82,17 @@ pub struct Surface8 {
     pub normal: Vec3x8,
     /// Bound on the distance of `point` from the exact surface, scene units.
     pub error: Float8,
+}
+
+/// One hit point to f64 accuracy.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Surface64 {
+    /// Place on the ray.
+    pub t: f64,
+    /// On the surface.
+    pub point: DVec3,
+    /// Geometric, outward, unit.
+    pub normal: DVec3,
 }
 
 /// A ray in f64, relative to the plan's origin.
@@ -108,12 +121,22 @@ impl Ray64 {
         self.t_min < t && t <= self.t_max
     }
 
+    /// The point at `t`.
+    pub fn at(&self, t: f64) -> DVec3 {
+        self.origin + t * self.dir
+    }
+
     /// The smaller of two roots that lies on the ray, unless its side is hidden; the entry meets the
     /// front, the exit the back.
     pub fn first(&self, entry: f64, exit: f64, visible: Visible) -> Option<f64> {
         let entry = Some(entry).filter(|t| visible != Visible::Back && self.accepts(*t));
         entry.or_else(|| Some(exit).filter(|t| visible != Visible::Front && self.accepts(*t)))
     }
+}
+
+/// The one of two roots that is nearer to `t`.
+fn nearer(a: f64, b: f64, t: f64) -> f64 {
+    if (a - t).abs() <= (b - t).abs() { a } else { b }
 }
 
 /// Which sides of each row are seen; nothing is stored where all rows show both.

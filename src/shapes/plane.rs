@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{Hidden8, Ray64, Sides, Store, Surface8, roundings};
+use super::{Hidden8, Ray64, Sides, Store, Surface8, Surface64, roundings};
 use crate::lanes::{Column3, Float8, Hit8, LANES, Mask8, RayPacket, Vec3x8};
 use crate::plan::{Owner, PlanePart};
 use crate::scene::{Visible, basis};
@@ -87,6 +87,10 @@ impl Store for Planes {
         (t.is_finite() && ray.accepts(t) && shows(nd, visible)).then_some(t)
     }
 
+    fn refine(part: &PlanePart, ray: &Ray64, _: f64) -> Surface64 {
+        flat_surface64(part.point, part.normal, ray)
+    }
+
     #[inline(always)]
     fn surface(row: &Row, rays: &RayPacket, t: Float8) -> Surface8 {
         flat_surface(row.point, row.normal, rays, t)
@@ -129,6 +133,13 @@ pub(super) fn shows(nd: f64, visible: Visible) -> bool {
         Visible::Front => nd < 0.0,
         Visible::Back => nd >= 0.0,
     }
+}
+
+/// Where a ray meets the plane through `anchor`.
+pub(super) fn flat_surface64(anchor: DVec3, normal: DVec3, ray: &Ray64) -> Surface64 {
+    let t = normal.dot(anchor - ray.origin) / normal.dot(ray.dir);
+    let point = ray.at(t);
+    Surface64 { t, point: point + normal * normal.dot(anchor - point), normal }
 }
 
 /// The hit point moved along the normal onto the plane through `anchor`.

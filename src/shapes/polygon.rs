@@ -3,8 +3,8 @@
 
 use glam::{DVec2, DVec3};
 
-use super::plane::{flat_surface, shows, side_hidden};
-use super::{Hidden8, Ray64, Sides, Store, Surface8, roundings};
+use super::plane::{flat_surface, flat_surface64, shows, side_hidden};
+use super::{Hidden8, Ray64, Sides, Store, Surface8, Surface64, roundings};
 use crate::lanes::{Column3, Float8, Hit8, LANES, Mask8, RayPacket, Vec3x8};
 use crate::plan::{Owner, PolygonPart};
 use crate::scene::Visible;
@@ -130,6 +130,10 @@ impl<const N: usize> Store for Polygons<N> {
             a.cross(side).dot(ray.dir) * nd.signum() >= -bound
         };
         (0..N).all(inside).then_some(t)
+    }
+
+    fn refine(part: &PolygonPart<N>, ray: &Ray64, _: f64) -> Surface64 {
+        flat_surface64(part.corners[0], part.normal, ray)
     }
 
     #[inline(always)]

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3};
 
-use super::{Hidden8, Ray64, Sides, Store, Surface8, column_of, roundings};
+use super::{Hidden8, Ray64, Sides, Store, Surface8, Surface64, column_of, nearer, roundings};
 use crate::lanes::{
     Column, Column3, Float8, Hit8, LANES, Mask8, RayPacket, Vec3x8, difference_of_products, square_sum_minus,
 };
@@ -129,19 +129,19 @@ impl Store for Spheres {
         Hit8 { mask: hit.mask & !doubt, doubt, ..hit }
     }
 
-    /// By Lagrange's identity: the discriminant is `r^2 d.d - |f x d|^2`.
     fn decide(part: &SpherePart, ray: &Ray64, visible: Visible) -> Option<f64> {
         let f = part.center - ray.origin;
-        let (fd, dd, r2) = (f.dot(ray.dir), ray.dir.length_squared(), part.radius * part.radius);
-        let area = f.cross(ray.dir).length_squared();
-        let disc = r2 * dd - area;
-        let bound = 8.0 * f64::EPSILON * dd * (r2 + part.radius * f.length());
-        if disc < -bound {
-            return None;
-        }
-        let z = fd + disc.max(0.0).sqrt().copysign(fd);
-        let (a, b) = (z / dd, (f.length() - part.radius) * (f.length() + part.radius) / z);
-        ray.first(a.min(b), a.max(b), visible)
+        let (disc, [a, b]) = roots(part, ray);
+        let reach = part.radius * (part.radius + f.length());
+        let bound = 8.0 * f64::EPSILON * ray.dir.length_squared() * reach;
+        (disc >= -bound).then(|| ray.first(a.min(b), a.max(b), visible)).flatten()
+    }
+
+    fn refine(part: &SpherePart, ray: &Ray64, t: f64) -> Surface64 {
+        let (_, [a, b]) = roots(part, ray);
+        let t = nearer(a, b, t);
+        let normal = (t * ray.dir - (part.center - ray.origin)).normalize();
+        Surface64 { t, point: part.center + normal * part.radius, normal }
     }
 
     /// From the decomposition that the kernel uses, never from (origin + t dir) - center.
@@ -178,6 +178,16 @@ impl Store for Spheres {
     fn column_bytes(&self) -> usize {
         self.center.bytes() + self.radius.bytes()
     }
+}
+
+/// By Lagrange's identity: the discriminant `r^2 d.d - |f x d|^2`, and both roots (of a tangent where
+/// it is negative).
+fn roots(part: &SpherePart, ray: &Ray64) -> (f64, [f64; 2]) {
+    let f = part.center - ray.origin;
+    let (fd, dd) = (f.dot(ray.dir), ray.dir.length_squared());
+    let disc = part.radius * part.radius * dd - f.cross(ray.dir).length_squared();
+    let z = fd + disc.max(0.0).sqrt().copysign(fd);
+    (disc, [z / dd, (f.length() - part.radius) * (f.length() + part.radius) / z])
 }
 
 /// `x` with the sign of `sign`; `x >= 0` or NaN.

@@ -2,7 +2,9 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{Boxes, Cones, Cylinders, Disks, Planes, Polygons, Sides, Spheres, Store, Surface8, TurnedBoxes};
+use super::{
+    Boxes, Cones, Cylinders, Disks, Planes, Polygons, Ray64, Sides, Spheres, Store, Surface8, Surface64, TurnedBoxes,
+};
 use crate::lanes::{Float8, LANES, Mask8, RayPacket, Vec3x8};
 use crate::plan::{Kind, Owner, Parts};
 use crate::scene::Visible;
@@ -106,6 +108,11 @@ impl Stores {
         surface
     }
 
+    /// What a ray meets on a row near `t`, in f64.
+    pub fn refine(&self, row: RowRef, ray: &Ray64, t: f64) -> Option<Surface64> {
+        row.kind().map(|kind| self.visit(kind, Refine { row: row.row(), ray, t }))
+    }
+
     /// Texture coordinates of a point, relative to the plan's origin, on a row.
     pub fn uv(&self, row: RowRef, point: DVec3) -> Option<DVec2> {
         row.kind().map(|kind| self.visit(kind, UvOf { row: row.row(), point }))
@@ -196,6 +203,19 @@ impl Visit for SurfaceOf<'_> {
     type Output = Surface8;
     fn visit<S: Store>(self, store: &S) -> Surface8 {
         S::surface(&store.gather(self.rows), self.rays, self.t)
+    }
+}
+
+struct Refine<'a> {
+    row: usize,
+    ray: &'a Ray64,
+    t: f64,
+}
+
+impl Visit for Refine<'_> {
+    type Output = Surface64;
+    fn visit<S: Store>(self, store: &S) -> Surface64 {
+        S::refine(&store.parts()[self.row], self.ray, self.t)
     }
 }
 

@@ -2,8 +2,8 @@
 
 use glam::{DVec2, DVec3};
 
-use super::cuboid::{face, face_uv, first_of, slabs, slabs64};
-use super::{Hidden8, Ray64, Sides, Store, Surface8, roundings};
+use super::cuboid::{face, face_uv, face64, first_of, slabs, slabs64};
+use super::{Hidden8, Ray64, Sides, Store, Surface8, Surface64, nearer, roundings};
 use crate::lanes::{Column3, Float8, Hit8, LANES, RayPacket, Vec3x8};
 use crate::plan::{Owner, TurnedBoxPart};
 use crate::scene::Visible;
@@ -85,6 +85,15 @@ impl Store for TurnedBoxes {
         let f = part.local(part.center - ray.origin);
         let (entry, exit) = slabs64(f - part.half, f + part.half, part.local(ray.dir));
         (entry <= exit).then(|| ray.first(entry, exit, visible)).flatten()
+    }
+
+    fn refine(part: &TurnedBoxPart, ray: &Ray64, t: f64) -> Surface64 {
+        let (f, dir) = (part.local(part.center - ray.origin), part.local(ray.dir));
+        let (entry, exit) = slabs64(f - part.half, f + part.half, dir);
+        let t = nearer(entry, exit, t);
+        let (point, normal) = face64(-part.half, part.half, t * dir - f);
+        let turn = |v: DVec3| (0..3).map(|k| part.axes[k] * v[k]).sum::<DVec3>();
+        Surface64 { t, point: part.center + turn(point), normal: turn(normal) }
     }
 
     fn surface(row: &Row, rays: &RayPacket, t: Float8) -> Surface8 {

@@ -26,7 +26,7 @@ impl Reader<'_> {
     pub fn read_groups(&mut self) {
         for table in self.tables("groups", "group") {
             let named = table.need("name", |item| Some((text(item)?, item.span.clone())));
-            let translation = table.or("translation", DVec3::ZERO, point);
+            let translation = table.or("translate", DVec3::ZERO, point);
             let rotation = table.or("rotation", None, rotation);
             let scale = table.or("scale", 1.0, number(Rule::LENGTH));
             if let Some((name, span)) = named {

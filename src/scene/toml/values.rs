@@ -121,7 +121,12 @@ pub fn rotation(item: &Item<'_>) -> Option<Option<DQuat>> {
         (None, None, Some(q)) => {
             let q = DQuat::from_array(q);
             let length = q.length();
-            if length > 1e-100 { Some(q / length) } else { table.item("quaternion")?.wrong("must not be zero") }
+            // One that is unit already stays what it is to the bit, so that written scenes read back the same.
+            let unit = (length - 1.0).abs() <= 16.0 * f64::EPSILON;
+            match length > 1e-100 {
+                true => Some(if unit { q } else { q / length }),
+                false => table.item("quaternion")?.wrong("must not be zero"),
+            }
         }
         (None, None, None) | (Some(_), None, None) | (None, Some(_), None) => {
             table.missing("\"axis\" and \"angle\", or \"quaternion\"")

@@ -73,6 +73,5 @@ fn replace(file: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) ->
     Ok(())
 }
 
-// To become `cfg(test)` as soon as `Scene::load` and `Scene::from_toml` are here.
-#[cfg(any())]
+#[cfg(test)]
 mod tests;
