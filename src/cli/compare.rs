@@ -37,16 +37,16 @@ pub struct Args {
     #[arg(long)]
     json: bool,
     /// Most that the root mean square error may be
-    #[arg(long, value_name = "X", value_parser = args::limit)]
+    #[arg(long, value_name = "X", value_parser = args::limit, allow_negative_numbers = true)]
     max_rmse: Option<f64>,
     /// Most that any sample may differ by
-    #[arg(long, value_name = "X", value_parser = args::limit)]
+    #[arg(long, value_name = "X", value_parser = args::limit, allow_negative_numbers = true)]
     max_diff: Option<f64>,
     /// Least that the peak signal-to-noise ratio may be, in dB
-    #[arg(long, value_name = "X", value_parser = args::limit)]
+    #[arg(long, value_name = "X", value_parser = args::limit, allow_negative_numbers = true)]
     min_psnr: Option<f64>,
     /// Least that the structural similarity may be; 1 is the same
-    #[arg(long, value_name = "X", value_parser = args::limit)]
+    #[arg(long, value_name = "X", value_parser = args::limit, allow_negative_numbers = true)]
     min_ssim: Option<f64>,
 }
 

@@ -64,7 +64,7 @@ pub struct Args {
     #[command(flatten)]
     threads: Threads,
     /// Seed of the sample pattern [default: as in the scene]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     seed: Option<u64>,
     #[command(flatten)]
     stats: StatsFile,
