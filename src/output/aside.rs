@@ -12,6 +12,9 @@ use tempfile::NamedTempFile;
 
 use super::OutputError;
 
+/// Bytes that are written between two questions whether to go on.
+const PART: usize = 1 << 24;
+
 /// Writes a file whole, or leaves its name as it was.
 ///
 /// A new file gets the permissions of the process (0666 less its umask), a replaced one keeps its own. A symbolic
@@ -21,15 +24,30 @@ use super::OutputError;
 /// # Errors
 /// [`OutputError::Directory`], [`OutputError::NoDirectory`] or [`OutputError::Io`].
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+    write_while(path, bytes, || true)
+}
+
+/// As [`write()`], as long as the caller wants it: asked between parts, so that a long write can be given up. The
+/// name is left as it was then.
+///
+/// # Errors
+/// As [`write()`]; [`OutputError::Io`] of the kind `Interrupted` where it was given up.
+pub fn write_while(path: &Path, bytes: &[u8], go_on: impl Fn() -> bool) -> Result<(), OutputError> {
     let io = |source| OutputError::Io { path: path.into(), source };
+    let fill = |file: &mut dyn Write| {
+        bytes.chunks(PART).try_for_each(|part| match go_on() {
+            true => file.write_all(part),
+            false => Err(std::io::ErrorKind::Interrupted.into()),
+        })
+    };
     match target(path)? {
         Target::Special(name) => {
             let mut file = OpenOptions::new().write(true).open(name).map_err(io)?;
-            file.write_all(bytes).map_err(io)
+            fill(&mut file).map_err(io)
         }
         Target::File { name, directory } => {
             let mut file = beside(&name, &directory).map_err(io)?;
-            file.write_all(bytes).map_err(io)?;
+            fill(&mut file).map_err(io)?;
             if let Ok(old) = fs::metadata(&name) {
                 // A file system without permissions refuses this, and then there are none to keep.
                 let _ = file.as_file().set_permissions(old.permissions());
@@ -122,6 +140,18 @@ mod tests {
         check(&path).unwrap();
         check(&room.path().join("b.exr")).unwrap();
         assert_eq!(names(room.path()), ["a.exr"]);
+    }
+
+    #[test]
+    fn a_write_that_is_given_up_leaves_nothing() {
+        let room = tempfile::tempdir().unwrap();
+        let (path, asked) = (room.path().join("a.exr"), std::cell::Cell::new(0));
+        write(&path, b"old").unwrap();
+        let once = || asked.replace(asked.get() + 1) == 0;
+        let error = write_while(&path, &vec![0; PART + 1], once).unwrap_err();
+        assert!(matches!(error, OutputError::Io { source, .. } if source.kind() == std::io::ErrorKind::Interrupted));
+        assert_eq!((asked.get(), names(room.path())), (2, vec!["a.exr".to_owned()]));
+        assert_eq!(fs::read(&path).unwrap(), b"old");
     }
 
     #[test]

@@ -1,14 +1,18 @@
 //! A frame: tiles over the cores, cancellation, statistics.
 
 mod block;
+mod query;
+mod reference;
 mod stats;
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Instant;
 
 use glam::DVec3;
+use rayon::ThreadPool;
 use rayon::prelude::*;
 
+pub use self::query::Query;
 pub use self::stats::Stats;
 
 use self::block::{Block, BlockWork};
@@ -26,6 +30,8 @@ pub enum Engine {
     Packet,
     /// Every ray by itself: the same bits, more slowly.
     Single,
+    /// The [reference](crate::reference) in f64: every ray against every primitive.
+    Reference,
 }
 
 /// Told how a render goes on, and asked whether it is to go on. Called from any thread.
@@ -209,13 +215,12 @@ impl<'s> Renderer<'s> {
     /// Renders the picture.
     pub fn render(&self, progress: &dyn Progress) -> Result<Rendering, RenderError> {
         let window = self.checked_window()?;
-        let threads = match self.threads {
-            0 => std::thread::available_parallelism().map_or(1, usize::from),
-            threads => threads,
-        };
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        let pool = pool.map_err(|error| RenderError::Threads(error.to_string()))?;
+        let pool = pool(self.threads)?;
+        let threads = pool.current_num_threads();
         pool.install(|| {
+            if self.engine == Engine::Reference {
+                return reference::render(self, window, threads, progress);
+            }
             let frame = Frame::prepare(self);
             let (blocks, trace_seconds) = frame.trace(window, progress)?;
             let mut picture = Picture::new((self.image.width, self.image.height), window);
@@ -237,6 +242,16 @@ impl<'s> Renderer<'s> {
             false => Err(RenderError::BadWindow { window, width: display.0, height: display.1 }),
         }
     }
+}
+
+/// So many threads; 0: as many as there are cores for this process.
+fn pool(threads: usize) -> Result<ThreadPool, RenderError> {
+    let threads = match threads {
+        0 => std::thread::available_parallelism().map_or(1, usize::from),
+        threads => threads,
+    };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.map_err(|error| RenderError::Threads(error.to_string()))
 }
 
 /// One frame with its tree built: for those who want to look on while parts of it are traced.

@@ -9,7 +9,7 @@
 mod background;
 mod camera;
 mod cloud;
-pub(crate) mod cloud_file;
+pub mod cloud_file;
 pub mod error;
 mod image;
 mod light;

@@ -1,0 +1,65 @@
+//! `octray check`: is the picture right?
+
+use std::path::PathBuf;
+
+use octray::measure::check::{CheckSettings, check};
+
+use super::Run;
+use super::args::{self, Threads};
+use super::exit::{Exit, Failure};
+use super::scene_file;
+
+const EXAMPLES: &str = "\
+Examples:
+  octray check fig5.toml                           every ray, or as many as a minute allows
+  octray check fig5.toml --seconds 5 --json        a quick look, for a machine
+  octray check fig5.toml --spp 16 --resolution 64x48";
+
+/// Arguments of `octray check`.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = EXAMPLES,
+    long_about = "Check the engine against the f64 reference on a scene\n\n\
+        Ray by ray: every ray that the engine traced is traced again by the reference, as the exact numbers that \
+        its bits are, and must meet the same primitive. Picture by picture: the reference renders the scene by \
+        itself, and the colours must agree. Ends with 1 where they do not."
+)]
+pub struct Args {
+    /// Scene file: .toml, .nff or .nff.gz
+    scene: PathBuf,
+    /// Seconds that the reference may take; where that is too short, a part of the pixels is drawn
+    #[arg(long, value_name = "S", default_value = "60", value_parser = args::limit)]
+    seconds: f64,
+    /// Samples per pixel
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    spp: u32,
+    /// Pixels of the whole picture [default: as in the scene]
+    #[arg(long, value_name = "WxH", value_parser = args::resolution)]
+    resolution: Option<(u32, u32)>,
+    /// Seed of the choice of pixels
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    #[command(flatten)]
+    threads: Threads,
+    /// Print the result as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
+    run.warn_of_build();
+    let mut scene = scene_file::load(&args.scene, run)?.scene;
+    scene_file::resize(&mut scene, args.resolution);
+    scene_file::need_memory(&scene, 0, "the check of this scene")?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads.count()).build();
+    let pool = pool.map_err(|error| Failure::new(Exit::Limit, format!("cannot start threads: {error}")))?;
+    let settings = CheckSettings { spp: args.spp, seconds: args.seconds, seed: args.seed, ..CheckSettings::default() };
+    let report = pool.install(|| check(&scene, &settings))?;
+    if args.json {
+        let json = serde_json::to_value(&report).map_err(|error| Failure::new(Exit::Limit, error))?;
+        run.console.print_json(&json)?;
+    } else {
+        run.console.print(&format!("{report}\n"))?;
+    }
+    Ok(if report.pass { Exit::Done } else { Exit::No })
+}

@@ -1,0 +1,122 @@
+//! `octray compare`: how far apart two pictures are.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use octray::measure::{Comparison, compare, heatmap};
+use octray::output::{self, Format, png};
+
+use super::Run;
+use super::args;
+use super::exit::{Exit, Failure};
+use super::pictures;
+
+const EXAMPLES: &str = "\
+Examples:
+  octray compare new.exr old.exr
+  octray compare new.exr old.exr --max-rmse 1e-4 --heatmap where.png
+  octray compare new.png old.png --min-psnr 40 --min-ssim 0.99 --json";
+
+/// Arguments of `octray compare`.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = EXAMPLES,
+    long_about = "Measure how far apart two pictures are\n\n\
+        RMSE, relative MSE and differences are of scene-linear values, PSNR and SSIM of what a display shows. \
+        Ends with 1 where a limit is not kept."
+)]
+pub struct Args {
+    /// Picture, EXR or PNG
+    a: PathBuf,
+    /// Picture to compare it with
+    b: PathBuf,
+    /// Write a picture of the differences, with a scale
+    #[arg(long, value_name = "FILE.png")]
+    heatmap: Option<PathBuf>,
+    /// Print the numbers as JSON
+    #[arg(long)]
+    json: bool,
+    /// Most that the root mean square error may be
+    #[arg(long, value_name = "X", value_parser = args::limit, allow_negative_numbers = true)]
+    max_rmse: Option<f64>,
+    /// Most that any sample may differ by
+    #[arg(long, value_name = "X", value_parser = args::limit, allow_negative_numbers = true)]
+    max_diff: Option<f64>,
+    /// Least that the peak signal-to-noise ratio may be, in dB
+    #[arg(long, value_name = "X", value_parser = args::limit, allow_negative_numbers = true)]
+    min_psnr: Option<f64>,
+    /// Least that the structural similarity may be; 1 is the same
+    #[arg(long, value_name = "X", value_parser = args::limit, allow_negative_numbers = true)]
+    min_ssim: Option<f64>,
+}
+
+pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
+    if let Some(path) = &args.heatmap {
+        if Format::of(path) != Some(Format::Png) {
+            return Err(Failure::new(Exit::Usage, format!("{}: a heat map should end in .png", path.display())));
+        }
+        run.check_output(path)?;
+    }
+    let (a, b) = (output::read(&args.a)?, output::read(&args.b)?);
+    let comparison = compare(&a, &b)?;
+    if let Some(path) = &args.heatmap {
+        let title = format!("{} - {}", args.a.display(), args.b.display());
+        let bytes = png::encode_raster(&heatmap(&a, &b)?, &title);
+        let bytes = bytes.map_err(|error| Failure::new(Exit::Output, error).of(path))?;
+        pictures::write_bytes(path, &bytes, run)?;
+    }
+    if args.json {
+        let json = serde_json::to_value(&comparison).map_err(|error| Failure::new(Exit::Limit, error))?;
+        run.console.print_json(&json)?;
+    } else {
+        run.console.print(&table(&comparison))?;
+    }
+    let broken = args.broken_limits(&comparison);
+    broken.iter().for_each(|limit| run.console.note(&format!("octray: {limit}")));
+    Ok(if broken.is_empty() { Exit::Done } else { Exit::No })
+}
+
+impl Args {
+    /// What is past its limit; a number that is none is past every limit.
+    fn broken_limits(&self, found: &Comparison) -> Vec<String> {
+        let most = |name: &str, value: f64, limit: Option<f64>| {
+            let limit = limit.filter(|limit| value.partial_cmp(limit).is_none_or(|order| order.is_gt()))?;
+            Some(format!("{name} is {value:.6e}, more than {limit:e}"))
+        };
+        let least = |name: &str, value: f64, limit: Option<f64>| {
+            let limit = limit.filter(|limit| value.partial_cmp(limit).is_none_or(|order| order.is_lt()))?;
+            Some(format!("{name} is {value}, less than {limit}"))
+        };
+        let limits = [
+            most("the RMSE", found.rmse, self.max_rmse),
+            most("the largest difference", found.max.value, self.max_diff),
+            least("the PSNR", found.psnr, self.min_psnr),
+            least("the SSIM", found.ssim, self.min_ssim),
+        ];
+        limits.into_iter().flatten().collect()
+    }
+}
+
+fn table(found: &Comparison) -> String {
+    let mut page = String::new();
+    let mut line = |name: &str, value: String| {
+        // Writing to a string cannot fail.
+        let _ = writeln!(page, "{name:<20} {value}");
+    };
+    line("RMSE", format!("{:.6e}", found.rmse));
+    line("relative MSE", format!("{:.6e}", found.rel_mse));
+    line("PSNR", format!("{:.2} dB", found.psnr));
+    line("SSIM", format!("{:.6}", found.ssim));
+    let max = &found.max;
+    line("largest difference", format!("{:.6e} in {} at {},{}", max.value, max.channel, max.x, max.y));
+    line("different pixels", format!("{:.4} % of {}", 100.0 * found.different_share, found.pixels));
+    if found.non_finite > 0 {
+        line("not finite", format!("{} samples", found.non_finite));
+    }
+    line("", format!("{:>12} {:>12} {:>12} {:>12} {:>12}", "RMSE", "bias", "median", "99 %", "max"));
+    for channel in &found.channels {
+        let numbers = [channel.rmse, channel.bias, channel.p50, channel.p99, channel.max];
+        line(channel.name, numbers.map(|number| format!("{number:>12.4e}")).join(" "));
+    }
+    page
+}

@@ -1,0 +1,86 @@
+//! `octray convert`: scenes to scenes, pictures to pictures, by extension.
+
+use std::path::{Path, PathBuf};
+
+use octray::output::{self, Description, Format};
+use octray::scene::write;
+
+use super::Run;
+use super::exit::{Exit, Failure};
+use super::pictures::{self, Depth, Target};
+use super::scene_file;
+
+const EXAMPLES: &str = "\
+Examples:
+  octray convert balls.nff.gz balls.toml           a scene that renders to the same bits
+  octray convert fig5.exr fig5.png --bits 16       a picture to look at
+  octray convert fig5.png fig5.exr";
+
+/// Arguments of `octray convert`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// Scene (.toml, .nff, .nff.gz) or picture (.exr, .png)
+    input: PathBuf,
+    /// Scene (.toml; its clouds go to .npy files beside it) or picture (.exr, .png)
+    output: PathBuf,
+    #[command(flatten)]
+    depth: Depth,
+}
+
+/// What a file is by its name.
+#[derive(Debug, PartialEq, Eq)]
+enum Kind {
+    Toml,
+    Nff,
+    Picture,
+}
+
+pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
+    let (input, output) = (&args.input, &args.output);
+    let usage = |path: &Path, text: &str| Failure::new(Exit::Usage, text).of(path);
+    let same = |a: &Path, b: &Path| a == b || a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
+    if same(input, output) {
+        return Err(usage(output, "is the input as well: the output should be another file"));
+    }
+    match (kind(input), kind(output)) {
+        (None, _) => Err(usage(input, "unknown kind of file: should end in .toml, .nff, .nff.gz, .exr or .png")),
+        (Some(Kind::Picture), Some(Kind::Picture)) => convert_picture(args, run),
+        (Some(Kind::Toml | Kind::Nff), Some(Kind::Toml)) => convert_scene(args, run),
+        (Some(Kind::Picture), _) => Err(usage(output, "a picture becomes a picture: should end in .exr or .png")),
+        (_, Some(Kind::Picture)) => {
+            Err(usage(output, "a scene becomes a scene (.toml); octray render makes a picture"))
+        }
+        _ => Err(usage(output, "a scene becomes a scene: should end in .toml")),
+    }
+}
+
+fn kind(path: &Path) -> Option<Kind> {
+    let name = path.file_name()?.to_string_lossy().to_lowercase();
+    if name.ends_with(".toml") {
+        Some(Kind::Toml)
+    } else if name.ends_with(".nff") || name.ends_with(".nff.gz") {
+        Some(Kind::Nff)
+    } else {
+        Format::of(path).map(|_| Kind::Picture)
+    }
+}
+
+fn convert_scene(args: &Args, run: &Run) -> Result<Exit, Failure> {
+    if args.depth.is_given() {
+        return Err(Failure::new(Exit::Usage, "--float and --bits are for pictures, not for scenes"));
+    }
+    run.check_output(&args.output)?;
+    let scene = scene_file::load(&args.input, run)?.scene;
+    let saved = run.signals.undisturbed(|| write::save(&scene, &args.output));
+    saved.map_err(|error| Failure::output(&args.output, &error))?;
+    Ok(Exit::Done)
+}
+
+fn convert_picture(args: &Args, run: &Run) -> Result<Exit, Failure> {
+    let target = Target::new(&args.output, run)?;
+    let options = args.depth.options(&target)?;
+    let picture = output::read(&args.input)?;
+    pictures::write(&picture, &target, options, &Description::default(), run)?;
+    Ok(Exit::Done)
+}

@@ -1,0 +1,157 @@
+//! The command line: one file a command, and what they share.
+//!
+//! A command reads its arguments, calls the library, and says what came of it; it decides nothing about
+//! pictures. Results go to standard output, remarks and errors to standard error, and the exit code tells
+//! the cause ([`exit::Exit`]). What the library is asked to write is checked before the work begins.
+//!
+//! | file | what it is about |
+//! |---|---|
+//! | `render`, `info`, `check`, `compare`, `query`, `convert`, `manual` | one command each (`manual`: two) |
+//! | `args` | words that several commands understand |
+//! | `scene_file`, `pictures`, `hits` | files in and out |
+//! | `console`, `progress`, `stats_json` | what is said, to people and machines |
+//! | `cpu`, `system`, `signals`, `exit` | the world around the process |
+
+mod args;
+mod check;
+mod compare;
+mod console;
+mod convert;
+pub mod cpu;
+mod exit;
+mod hits;
+mod info;
+mod manual;
+mod pictures;
+mod progress;
+mod query;
+mod render;
+mod scene_file;
+mod signals;
+mod stats_json;
+mod system;
+
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::LazyLock;
+use std::time::Instant;
+
+use clap::{Parser, Subcommand};
+use octray::output::aside;
+
+use self::console::{Console, When};
+use self::exit::{Exit, Failure};
+use self::signals::Signals;
+
+static VERSION: LazyLock<String> = LazyLock::new(cpu::version);
+
+const EXAMPLES: &str = "\
+Examples:
+  octray render scenes/fig5.toml -o fig5.exr     render a scene
+  octray info scenes/fig5.toml                   what is in it
+  octray check scenes/fig5.toml                  is the picture right?
+  octray compare fig5.exr yesterday.exr          how far apart are two pictures?
+
+`octray COMMAND --help` has the options of a command and examples of their use.
+
+Exit codes: 0 done; 1 the answer is no (check, compare); 2 wrong usage; 3 a bad input file;
+4 an output cannot be written; 5 out of memory or over a limit; 6 the CPU lacks what this
+build needs; 130 and 143 stopped by a signal.";
+
+/// Batch renderer and ray tracer for analytic primitives
+#[derive(Debug, Parser)]
+#[command(name = "octray", version = VERSION.as_str(), after_help = EXAMPLES, max_term_width = 100)]
+struct Cli {
+    /// When to use colours in messages
+    #[arg(long, global = true, value_enum, value_name = "WHEN", default_value_t)]
+    color: When,
+    /// Say nothing but errors
+    #[arg(short, long, global = true)]
+    quiet: bool,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Render a scene to an EXR or PNG file
+    Render(render::Args),
+    /// Say what a scene holds and what it takes
+    Info(info::Args),
+    /// Check the engine against the f64 reference on a scene
+    Check(check::Args),
+    /// Measure how far apart two pictures are
+    Compare(compare::Args),
+    /// Trace the rays of a file and write what they meet
+    Query(query::Args),
+    /// Convert scenes to TOML, and pictures between EXR and PNG
+    Convert(convert::Args),
+    /// Print the completions of a shell
+    Completions(manual::CompletionArgs),
+    /// Print the manual page, or write the pages of all commands
+    Man(manual::ManArgs),
+}
+
+/// What surrounds a command.
+#[derive(Debug)]
+pub struct Run {
+    /// When the process began.
+    start: Instant,
+    console: Console,
+    signals: Signals,
+}
+
+impl Run {
+    /// Makes sure, before any work, that a file can be written.
+    fn check_output(&self, path: &Path) -> Result<(), Failure> {
+        Ok(self.signals.undisturbed(|| aside::check(path))?)
+    }
+
+    /// Says what makes this build slow, before work that takes time.
+    fn warn_of_build(&self) {
+        cpu::warnings().iter().for_each(|warning| self.console.warn(warning));
+    }
+}
+
+/// Runs the command line of this process.
+#[inline(never)]
+pub fn run() -> ExitCode {
+    let start = Instant::now();
+    std::panic::set_hook(Box::new(|panic| {
+        let place = panic.location().map(|place| format!(" at {}:{}", place.file(), place.line())).unwrap_or_default();
+        console::say(&format!("octray: error: a mistake in octray itself{place}; please report it with the scene"));
+    }));
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(message) => {
+            let _ = message.print();
+            return ExitCode::from(u8::try_from(message.exit_code()).unwrap_or(Exit::Usage as u8));
+        }
+    };
+    let run = Run { start, console: Console::new(cli.color, cli.quiet), signals: Signals::watch() };
+    let result = match &cli.command {
+        Command::Render(args) => render::run(args, &run),
+        Command::Info(args) => info::run(args, &run),
+        Command::Check(args) => check::run(args, &run),
+        Command::Compare(args) => compare::run(args, &run),
+        Command::Query(args) => query::run(args, &run),
+        Command::Convert(args) => convert::run(args, &run),
+        Command::Completions(args) => manual::completions(args, &run),
+        Command::Man(args) => manual::man(args, &run),
+    };
+    let exit = result.unwrap_or_else(|failure| {
+        run.console.error(&failure.message);
+        failure.exit
+    });
+    ExitCode::from(exit as u8)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_definition_of_the_command_line_is_sound() {
+        super::Cli::command().debug_assert();
+    }
+}

@@ -1,0 +1,225 @@
+//! `octray render`: a scene to a picture.
+
+use std::path::{Path, PathBuf};
+use std::time::{Instant, SystemTime};
+
+use clap::ValueEnum;
+use octray::film::Window;
+use octray::output::{Description, description};
+use octray::render::{Engine, Stats};
+use octray::scene::Integrator;
+use octray::{Renderer, Rendering};
+
+use super::Run;
+use super::args::{self, EngineName, StatsFile, Threads};
+use super::exit::{Exit, Failure};
+use super::pictures::{self, Depth, Target};
+use super::progress::Bar;
+use super::stats_json::{self, Seconds};
+use super::{scene_file, system};
+
+/// Memory that a pixel takes at the most, in bytes: its value in its block and in the picture while blocks are
+/// put together, or in the picture, as samples of the file and in the file (measured, rounded up).
+const PIXEL_BYTES: u64 = 40;
+
+const EXAMPLES: &str = "\
+Examples:
+  octray render fig5.toml                                    writes fig5.exr here
+  octray render fig5.toml -o fig5.png --bits 16              a picture to look at
+  octray render fig5.toml -o draft.png --resolution 320x240 --spp 1
+  octray render fig5.toml -o part.exr --crop 100,100,200,200 --stats part.json
+  octray render fig5.toml -o slow.exr --engine reference     by the f64 reference
+  octray render fig5.toml -o - -q | oiiotool - -o fig5.tif   EXR to standard output";
+
+/// Arguments of `octray render`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// Scene file: .toml, .nff or .nff.gz
+    scene: PathBuf,
+    /// Picture to write, .exr or .png; - is EXR to standard output [default: the scene's name with .exr, here]
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Camera of the scene, by its name [default: the first one]
+    #[arg(long, value_name = "NAME")]
+    camera: Option<String>,
+    /// Pixels of the whole picture [default: as in the scene]
+    #[arg(long, value_name = "WxH", value_parser = args::resolution)]
+    resolution: Option<(u32, u32)>,
+    /// Render only these pixels, the second corner excluded; they are the same as in the whole picture
+    #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = args::crop, allow_hyphen_values = true)]
+    crop: Option<Window>,
+    /// Samples per pixel [default: as in the scene]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    spp: Option<u32>,
+    /// How light is found [default: as in the scene]
+    #[arg(long, value_enum, value_name = "NAME")]
+    integrator: Option<IntegratorName>,
+    /// Longest chain of rays, the camera ray being 1 [default: as in the scene]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    max_depth: Option<u32>,
+    /// Who finds what rays meet
+    #[arg(long, value_enum, value_name = "NAME", default_value_t)]
+    engine: EngineName,
+    #[command(flatten)]
+    threads: Threads,
+    /// Seed of the sample pattern [default: as in the scene]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    seed: Option<u64>,
+    #[command(flatten)]
+    stats: StatsFile,
+    /// Do all the work, needed or not: the same picture to the bit
+    #[arg(long)]
+    no_skip: bool,
+    #[command(flatten)]
+    depth: Depth,
+    /// Leave out of the file what differs from run to run (date, seconds, threads); so does SOURCE_DATE_EPOCH
+    #[arg(long)]
+    no_date: bool,
+}
+
+/// Integrators by their names in scene files.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum IntegratorName {
+    /// Direct light with mirror reflection and refraction
+    Direct,
+}
+
+impl From<IntegratorName> for Integrator {
+    fn from(name: IntegratorName) -> Integrator {
+        match name {
+            IntegratorName::Direct => Integrator::Direct,
+        }
+    }
+}
+
+pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
+    run.warn_of_build();
+    let output = args.output.clone().unwrap_or_else(|| default_output(&args.scene));
+    let target = Target::new(&output, run)?;
+    let options = args.depth.options(&target)?;
+    if let Some(stats) = &args.stats.stats {
+        if *stats == output {
+            return Err(Failure::new(Exit::Usage, format!("{}: both the picture and --stats", stats.display())));
+        }
+        run.check_output(stats)?;
+    }
+    let loaded = scene_file::load(&args.scene, run)?;
+    let mut scene = loaded.scene;
+    scene_file::resize(&mut scene, args.resolution);
+    if let Some(name) = args.integrator {
+        scene.render.integrator = name.into();
+    }
+    let renderer = args.renderer(&scene)?;
+    let image = renderer.image();
+    let window = args.crop.unwrap_or(Window::full((image.width, image.height)));
+    let work = format!("a picture of {}x{} pixels", window.width(), window.height());
+    scene_file::need_memory(&scene, PIXEL_BYTES.saturating_mul(window.area() as u64), &work)?;
+    if args.output.is_none() {
+        run.console.note(&format!("octray: no -o given: the picture goes to {target}"));
+    }
+
+    let bar = Bar::new(run, format!("{target}"));
+    let rendering = renderer.render(&bar)?;
+    drop(bar);
+    let stats = &rendering.stats;
+    let writing = Instant::now();
+    let picture = args.description(&renderer, stats);
+    pictures::write(&rendering.picture, &target, options, &picture, run)?;
+    let seconds = Seconds {
+        load: loaded.seconds,
+        plan: stats.plan_seconds,
+        build: stats.build_seconds,
+        trace: stats.trace_seconds,
+        write: writing.elapsed().as_secs_f64(),
+    };
+    args.write_stats(stats, &seconds, run)?;
+    run.console.note(&summary(&rendering, image.spp, &target, run));
+    Ok(Exit::Done)
+}
+
+impl Args {
+    fn renderer<'s>(&self, scene: &'s octray::Scene) -> Result<Renderer<'s>, Failure> {
+        let mut renderer =
+            Renderer::new(scene)?.threads(self.threads.count()).skip(!self.no_skip).engine(Engine::from(self.engine));
+        if let Some(name) = &self.camera {
+            renderer = renderer.camera(name)?;
+        }
+        if let Some(window) = self.crop {
+            renderer = renderer.crop(window);
+        }
+        if let Some(spp) = self.spp {
+            renderer = renderer.spp(spp);
+        }
+        if let Some(depth) = self.max_depth {
+            renderer = renderer.max_depth(depth);
+        }
+        if let Some(seed) = self.seed {
+            renderer = renderer.seed(seed);
+        }
+        Ok(renderer)
+    }
+
+    fn description(&self, renderer: &Renderer, stats: &Stats) -> Description {
+        let run = description::Run {
+            date: SystemTime::now(),
+            seconds: stats.plan_seconds + stats.build_seconds + stats.trace_seconds,
+            threads: u32::try_from(stats.threads).unwrap_or(u32::MAX),
+            rays: Some(total_rays(stats).to_string()),
+            shard: None,
+        };
+        let dated = !self.no_date && std::env::var_os("SOURCE_DATE_EPOCH").is_none();
+        Description {
+            scene: self.scene.file_name().map(|name| name.to_string_lossy().into_owned()),
+            camera: Some(renderer.view().clone()),
+            spp: Some(renderer.image().spp),
+            seed: Some(renderer.pattern()),
+            run: dated.then_some(run),
+            ..Description::default()
+        }
+    }
+
+    fn write_stats(&self, work: &Stats, seconds: &Seconds, run: &Run) -> Result<(), Failure> {
+        let Some(path) = &self.stats.stats else { return Ok(()) };
+        let mut stats = stats_json::common(run, work.threads, seconds);
+        stats_json::add_render(&mut stats, work, self.engine == EngineName::Reference);
+        stats_json::add_memory(&mut stats, work.column_bytes, work.tree_bytes);
+        stats_json::write(path, stats, run)
+    }
+}
+
+/// The scene's name with another ending, in the directory that the command was called from.
+fn default_output(scene: &Path) -> PathBuf {
+    let name = scene.file_name().unwrap_or_default().to_string_lossy();
+    let stem = [".nff.gz", ".toml", ".nff"].iter().find_map(|ending| name.strip_suffix(ending));
+    PathBuf::from(format!("{}.exr", stem.unwrap_or(&name)))
+}
+
+fn total_rays(stats: &Stats) -> u64 {
+    stats.rays.rays.iter().sum()
+}
+
+fn summary(rendering: &Rendering, spp: u32, target: &Target, run: &Run) -> String {
+    let (window, stats) = (rendering.picture.window, &rendering.stats);
+    let (millions, seconds) = (total_rays(stats) as f64 / 1e6, stats.trace_seconds);
+    format!(
+        "{target}: {}x{} pixels, {spp} spp, {millions:.2} million rays in {seconds:.2} s ({:.1} Mrays/s), {:.2} s in all, {}",
+        window.width(),
+        window.height(),
+        millions / seconds.max(1e-9),
+        run.start.elapsed().as_secs_f64(),
+        system::peak_bytes().map_or_else(|| "done".to_owned(), |bytes| format!("{} of memory", system::size(bytes))),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_usual_output_is_named_after_the_scene() {
+        let names =
+            ["scenes/fig5.toml", "balls.nff.gz", "../a.b.nff", "odd"].map(|name| default_output(Path::new(name)));
+        assert_eq!(names.map(|name| name.display().to_string()), ["fig5.exr", "balls.exr", "a.b.exr", "odd.exr"]);
+    }
+}

@@ -1,0 +1,74 @@
+//! Scenes for the commands: read, with everything that is wrong shown.
+
+use std::path::Path;
+use std::time::Instant;
+
+use octray::Scene;
+use octray::scene::{CloudShapes, Filter, ImageSettings, SceneErrors, Shape};
+
+use super::Run;
+use super::exit::{Exit, Failure};
+use super::system;
+
+/// Memory that a build takes for a sphere on top of the scene, in bytes: parts, boxes, tree and columns
+/// together at their most (measured on a million: 360).
+const SPHERE_BYTES: usize = 400;
+/// The same for a corner of a polygon (measured on a million triangles: 185).
+const CORNER_BYTES: usize = 200;
+/// The same for every other primitive (measured on a million disks: 420).
+const OTHER_BYTES: usize = 600;
+/// Samples per pixel of a scene without an image, as in scene files.
+const SPP: u32 = 16;
+
+/// A scene and how long it took to read.
+pub struct Loaded {
+    pub scene: Scene,
+    pub seconds: f64,
+}
+
+/// Reads a scene and shows its warnings.
+pub fn load(path: &Path, run: &Run) -> Result<Loaded, Failure> {
+    let start = Instant::now();
+    let scene = Scene::load(path).map_err(|errors| failure(path, &errors, run.console.color))?;
+    for warning in &scene.warnings {
+        run.console.note(&format!("octray: {warning}"));
+    }
+    Ok(Loaded { scene, seconds: start.elapsed().as_secs_f64() })
+}
+
+/// Makes sure that a tree can be built, and so many bytes more taken.
+pub fn need_memory(scene: &Scene, more: u64, work: &str) -> Result<(), Failure> {
+    let objects = scene.objects.iter().map(|object| match &object.shape {
+        Shape::Sphere(_) => SPHERE_BYTES,
+        Shape::Polygon(polygon) => CORNER_BYTES * polygon.corners.len(),
+        Shape::Plane(_) | Shape::Disk(_) | Shape::Box(_) | Shape::Cylinder(_) | Shape::Cone(_) => OTHER_BYTES,
+    });
+    let clouds = scene.clouds.iter().map(|cloud| match &cloud.shapes {
+        CloudShapes::Spheres(rows) => SPHERE_BYTES * rows.len(),
+        CloudShapes::Polygons { corners, .. } => CORNER_BYTES * corners.len(),
+        CloudShapes::Disks(_) | CloudShapes::Boxes(..) => OTHER_BYTES * cloud.len(),
+    });
+    let build: usize = objects.chain(clouds).sum();
+    system::need_memory((build as u64).saturating_add(more), work)
+}
+
+/// Gives the picture another size, or a scene without a picture its first.
+pub fn resize(scene: &mut Scene, resolution: Option<(u32, u32)>) {
+    let Some((width, height)) = resolution else { return };
+    let image = scene.image.take().unwrap_or(ImageSettings { width, height, spp: SPP, filter: Filter::default() });
+    scene.image = Some(ImageSettings { width, height, ..image });
+}
+
+/// All errors with the lines they are in; where a file as a whole is wrong, one line.
+fn failure(path: &Path, errors: &SceneErrors, color: bool) -> Failure {
+    let lone = errors.iter().next().filter(|error| errors.len() == 1 && error.span.is_none());
+    if let Some(error) = lone {
+        return Failure::new(Exit::Input, error);
+    }
+    let count = match errors.len() {
+        1 => "1 mistake".to_owned(),
+        more => format!("{more} mistakes"),
+    };
+    let report = errors.report(color);
+    Failure::new(Exit::Input, format!("{}: {count} in the scene\n{}", path.display(), report.trim_end()))
+}

@@ -1,0 +1,90 @@
+//! `--stats FILE.json`: what a run did and what it took.
+
+use std::path::Path;
+
+use octray::integrate::RayKind;
+use octray::plan::Kind;
+use octray::render::Stats;
+use serde_json::{Map, Value, json};
+
+use super::console::pretty;
+use super::exit::Failure;
+use super::{Run, cpu, pictures, system};
+
+/// Wall time by stage.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Seconds {
+    /// Reading the scene.
+    pub load: f64,
+    /// Taking it apart.
+    pub plan: f64,
+    /// Columns and tree.
+    pub build: f64,
+    /// Tracing; shading is part of it.
+    pub trace: f64,
+    /// Encoding and writing.
+    pub write: f64,
+}
+
+/// What every run has to tell. `shade` is null: it is not measured apart from `trace`, which holds it.
+pub fn common(run: &Run, threads: usize, seconds: &Seconds) -> Map<String, Value> {
+    let Seconds { load, plan, build, trace, write } = *seconds;
+    let total = run.start.elapsed().as_secs_f64();
+    let seconds = json!({
+        "load": load, "plan": plan, "build": build, "trace": trace, "shade": null, "write": write, "total": total,
+    });
+    let mut stats = Map::new();
+    let mut set = |name: &str, value: Value| stats.insert(name.to_owned(), value);
+    set("schema", json!(1));
+    set("octray", json!(env!("CARGO_PKG_VERSION")));
+    set("simd", json!(cpu::SIMD));
+    set("threads", json!(threads));
+    set("seconds", seconds);
+    set("cpu_seconds", json!(system::cpu_seconds()));
+    stats
+}
+
+/// What a render did. The reference does not tell how many shadow rays met something: null.
+pub fn add_render(stats: &mut Map<String, Value>, work: &Stats, is_reference: bool) {
+    let by_kind = |counts: &[u64]| -> Map<String, Value> {
+        let kinds = RayKind::ALL.into_iter().map(|kind| (kind.name().to_owned(), json!(counts[kind as usize])));
+        kinds.chain([("bounce".to_owned(), json!(0))]).collect()
+    };
+    let mut hits = by_kind(&work.rays.hits);
+    if is_reference {
+        hits.insert(RayKind::Shadow.name().to_owned(), Value::Null);
+    }
+    stats.insert("rays".to_owned(), Value::Object(by_kind(&work.rays.rays)));
+    stats.insert("hits".to_owned(), Value::Object(hits));
+    stats.insert("tests".to_owned(), Value::Object(tests(work)));
+    stats.insert("redecided".to_owned(), json!(work.tests.redecided));
+    stats.insert("tiles".to_owned(), json!({ "total": work.tiles, "background": work.background_tiles }));
+    stats.insert("skipped".to_owned(), json!([]));
+}
+
+/// `box` counts boxes of tree nodes; the primitive of that name is `cuboid` here.
+fn tests(work: &Stats) -> Map<String, Value> {
+    let mut tests = Map::from_iter([("box".to_owned(), json!(work.tests.boxes))]);
+    for kind in Kind::ALL {
+        let name = match kind {
+            Kind::Triangle | Kind::Quad | Kind::Octagon => "polygon",
+            Kind::Box | Kind::TurnedBox => "cuboid",
+            Kind::Sphere | Kind::Plane | Kind::Disk | Kind::Cylinder | Kind::Cone => kind.name(),
+        };
+        let before = tests.get(name).and_then(Value::as_u64).unwrap_or(0);
+        tests.insert(name.to_owned(), json!(before + work.tests.kinds[kind as usize]));
+    }
+    tests
+}
+
+/// Memory so far, and what columns and tree take of it.
+pub fn add_memory(stats: &mut Map<String, Value>, column_bytes: usize, tree_bytes: usize) {
+    let peak = system::peak_bytes();
+    let memory = json!({ "peak_bytes": peak, "column_bytes": column_bytes, "tree_bytes": tree_bytes });
+    stats.insert("memory".to_owned(), memory);
+}
+
+/// Writes them.
+pub fn write(path: &Path, stats: Map<String, Value>, run: &Run) -> Result<(), Failure> {
+    pictures::write_bytes(path, pretty(&Value::Object(stats)).as_bytes(), run)
+}
