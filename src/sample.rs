@@ -25,24 +25,34 @@ pub fn pixel_key(seed: u64, x: i32, y: i32) -> u32 {
     (mix(mix(seed) ^ place) >> 32) as u32
 }
 
+/// The sample pattern of one pixel in one pair of dimensions: keys of its order and of its coordinates.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Pattern {
+    order: u32,
+    first: u32,
+    second: u32,
+}
+
+impl Pattern {
+    /// The pattern of a pixel, by its key.
+    #[inline]
+    pub fn new(pixel_key: u32, dimension: u32) -> Self {
+        let order = hash(pixel_key ^ hash(dimension.wrapping_add(0x9e37_79b9)));
+        Pattern { order, first: hash(order ^ 0x68bc_21eb), second: hash(order ^ 0x02e5_be93) }
+    }
+
+    /// Sample `index`, as fractions of 2^32.
+    #[inline]
+    pub fn sample(&self, index: u32) -> [u32; 2] {
+        let i = laine_karras(index.reverse_bits(), self.order).reverse_bits();
+        [laine_karras(i, self.first).reverse_bits(), laine_karras(pascal(i), self.second).reverse_bits()]
+    }
+}
+
 /// Sample `index` of a pixel in one pair of dimensions, as fractions of 2^32.
 #[inline]
 pub fn pair(pixel_key: u32, index: u32, dimension: u32) -> [u32; 2] {
-    let key = hash(pixel_key ^ hash(dimension.wrapping_add(0x9e37_79b9)));
-    let i = laine_karras(index.reverse_bits(), key).reverse_bits();
-    let x = laine_karras(i, hash(key ^ 0x68bc_21eb)).reverse_bits();
-    let y = laine_karras(pascal(i), hash(key ^ 0x02e5_be93)).reverse_bits();
-    [x, y]
-}
-
-/// [`pair`] for eight samples at once: first coordinates, second coordinates.
-#[inline]
-pub fn pairs(pixel_keys: &[u32; 8], indices: &[u32; 8], dimension: u32) -> [[u32; 8]; 2] {
-    let (mut first, mut second) = ([0; 8], [0; 8]);
-    for lane in 0..8 {
-        [first[lane], second[lane]] = pair(pixel_keys[lane], indices[lane], dimension);
-    }
-    [first, second]
+    Pattern::new(pixel_key, dimension).sample(index)
 }
 
 /// Bits as the number they stand for, in the open interval 0..1.

@@ -41,6 +41,12 @@ impl Tile {
         Tile { packets, hits: [float8(RowRef::MISS.to_lane()); PACKETS], common }
     }
 
+    /// Takes the tile for new rays, which have met nothing yet; its packets are still to be set.
+    pub fn renew(&mut self, common: Option<[f32; 3]>) {
+        self.hits = [float8(RowRef::MISS.to_lane()); PACKETS];
+        self.common = common;
+    }
+
     /// What lane `lane` of packet `packet` met.
     pub fn hit(&self, packet: usize, lane: usize) -> RowRef {
         RowRef::from_lane(self.hits[packet].as_array()[lane])

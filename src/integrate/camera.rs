@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::lanes::{Float8, LANES, Mask8, RayPacket, Vec3x8, float8};
-use crate::sample::{self, dimension};
+use crate::sample::{self, Pattern, dimension};
 use crate::scene::{Camera, Filter, FilterTable, Lens};
 
 /// One camera over one display window.
@@ -44,9 +44,9 @@ impl CameraRays {
         (self.origin[1] == DVec3::ZERO).then(|| self.origin[0].as_vec3().to_array())
     }
 
-    /// Names the sample pattern of a pixel.
-    pub fn key(&self, x: i32, y: i32) -> u32 {
-        sample::pixel_key(self.seed, x, y)
+    /// The sample pattern of a pixel.
+    pub fn pattern(&self, x: i32, y: i32) -> Pattern {
+        Pattern::new(sample::pixel_key(self.seed, x, y), dimension::FILTER)
     }
 
     /// Eight rays in f64.
@@ -81,7 +81,10 @@ impl CameraRays {
         if self.centered {
             return points;
         }
-        let bits = sample::pairs(&samples.key, &samples.index, dimension::FILTER);
+        let mut bits = [[0; LANES]; 2];
+        for lane in 0..LANES {
+            [bits[0][lane], bits[1][lane]] = samples.pattern[lane].sample(samples.index[lane]);
+        }
         for (axis, bits) in points.iter_mut().zip(bits) {
             for lane in 0..LANES {
                 axis[lane] += self.filter.offset(sample::unit(bits[lane]));
@@ -98,8 +101,8 @@ pub struct Samples8 {
     pub x: [i32; LANES],
     /// Rows of the pixels.
     pub y: [i32; LANES],
-    /// Names of the pixels' sample patterns.
-    pub key: [u32; LANES],
+    /// Sample patterns of the pixels.
+    pub pattern: [Pattern; LANES],
     /// Indices of the samples.
     pub index: [u32; LANES],
 }

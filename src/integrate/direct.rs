@@ -5,9 +5,9 @@
 
 use super::hits::Shaded;
 use super::record::{RayCounts, RayKind, Record};
-use super::wave::{ExactRays, Wave, lanes};
+use super::wave::{Wave, lanes};
 use crate::accel::{PACKETS, Tile, Tree, Walk};
-use crate::lanes::{Float8, LANES, Mask8, Vec3x8, float8};
+use crate::lanes::{Float8, LANES, Mask8, RayPacket, Vec3x8, float8};
 use crate::plan::Plan;
 use crate::shade::{Backdrop8, LightTable, MaterialTable};
 use crate::shapes::RowRef;
@@ -42,6 +42,18 @@ pub struct Room {
     pub walk: Walk,
     /// Rays traced.
     pub rays: RayCounts,
+    /// Tiles that are done with.
+    pub(super) tiles: Vec<Box<Tile>>,
+}
+
+impl Room {
+    /// A tile whose packets are to be set.
+    pub fn tile(&mut self, common: Option<[f32; 3]>) -> Box<Tile> {
+        let dead = RayPacket::new(Vec3x8::ZERO, Vec3x8::splat([1.0; 3]), Float8::ZERO, Mask8::NONE);
+        let mut tile = self.tiles.pop().unwrap_or_else(|| Box::new(Tile::new([dead; PACKETS], None)));
+        tile.renew(common);
+        tile
+    }
 }
 
 /// Where the work on one tile goes.
@@ -71,18 +83,11 @@ impl<'s> Direct<'s> {
         self.plan.scatters
     }
 
-    /// Radiance along the camera rays of a tile.
-    ///
-    /// Where [`Direct::scatters`], `exact` holds the same rays before they were rounded.
-    pub fn radiance<R: Record>(
-        &self,
-        tile: Tile,
-        exact: Option<Box<ExactRays>>,
-        room: &mut Room,
-        record: &mut R,
-    ) -> Samples {
+    /// Radiance along camera rays, which where [`Direct::scatters`] keep what they were before they were
+    /// rounded.
+    pub fn radiance<R: Record>(&self, wave: Wave, room: &mut Room, record: &mut R) -> Samples {
         let mut samples = Samples { radiance: [Vec3x8::ZERO; PACKETS], alpha: [Float8::ZERO; PACKETS] };
-        self.trace(Wave::camera(tile, exact), &mut Sink { samples: &mut samples, room, record });
+        self.trace(wave, &mut Sink { samples: &mut samples, room, record });
         samples
     }
 
@@ -91,7 +96,7 @@ impl<'s> Direct<'s> {
         let redecided = sink.room.walk.counts.redecided;
         self.tree.closest_tile(&mut wave.tile, &mut sink.room.walk);
         sink.room.rays.redecided[wave.kind as usize] += sink.room.walk.counts.redecided - redecided;
-        let mut shaded = [None; PACKETS];
+        let mut shaded = [const { None }; PACKETS];
         for (p, live) in live.into_iter().enumerate().filter(|(_, live)| *live != 0) {
             let hit = lanes(live).filter(|i| wave.tile.hit(p, *i) != RowRef::MISS).map(|i| 1 << i).sum::<u32>();
             sink.room.rays.rays[wave.kind as usize] += u64::from(live.count_ones());
@@ -112,10 +117,12 @@ impl<'s> Direct<'s> {
             let (reflected, refracted) = self.branches(&wave, &shaded);
             for (kind, branches) in [(RayKind::Reflection, reflected), (RayKind::Refraction, refracted)] {
                 for chunk in branches.chunks(PACKETS * LANES) {
-                    self.trace(Wave::of_branches(chunk, kind, wave.depth + 1), sink);
+                    let tile = sink.room.tile(None);
+                    self.trace(Wave::of_branches(tile, chunk, kind, wave.depth + 1), sink);
                 }
             }
         }
+        sink.room.tiles.push(wave.tile);
     }
 
     fn tell<R: Record>(&self, wave: &Wave, p: usize, live: u32, record: &mut R) {

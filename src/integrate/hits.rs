@@ -11,7 +11,6 @@ use crate::shade::{Bsdf8, Facing, attributes};
 use crate::shapes::{Ray64, RowRef, Surface8};
 
 /// Eight hits, made ready for light.
-#[derive(Clone, Copy)]
 pub struct Shaded {
     pub hit: u32,
     pub front: Mask8,
@@ -26,7 +25,7 @@ pub struct Shaded {
     pub smooth: Mask8,
     pub bsdf: Bsdf8,
     /// In f64, where rays may go on.
-    pub exact: Option<[Exact; LANES]>,
+    pub exact: Option<Box<[Exact; LANES]>>,
 }
 
 /// One hit in f64, as rays go on from it.
@@ -137,11 +136,11 @@ impl Direct<'_> {
     }
 
     /// The hits of a packet again in f64, rounded into `surface`.
-    fn refine(&self, wave: &Wave, p: usize, hit: u32, surface: &mut Surface8) -> Option<[Exact; LANES]> {
+    fn refine(&self, wave: &Wave, p: usize, hit: u32, surface: &mut Surface8) -> Option<Box<[Exact; LANES]>> {
         let rays = &wave.exact.as_ref()?[p];
         let t = wave.tile.packets[p].t_max.to_array();
         let (mut points, mut normals) = (surface.point.to_arrays(), surface.normal.to_arrays());
-        let mut exact = [Exact::default(); LANES];
+        let mut exact = Box::new([Exact::default(); LANES]);
         for i in lanes(hit) {
             let (origin, dir) = rays.lane(i);
             let ray = Ray64 { origin, dir, t_min: 0.0, t_max: f64::INFINITY };

@@ -4,7 +4,7 @@ use super::direct::{Direct, Sink};
 use super::hits::Shaded;
 use super::record::{RayKind, Record};
 use super::wave::{Wave, lanes};
-use crate::accel::{PACKETS, Tile};
+use crate::accel::PACKETS;
 use crate::lanes::{Float8, Mask8, RayPacket, UNIT_ROUNDOFF, Vec3x8, float8};
 use crate::shade::{Illumination, Toward};
 
@@ -62,16 +62,16 @@ impl Direct<'_> {
         lit: &mut [u32; PACKETS],
         sink: &mut Sink<R>,
     ) {
-        let packet = |p: usize| match &shaded[p] {
-            Some(shaded) => shaded.shadow_rays(light, Mask8::from_bits(lit[p])),
-            None => RayPacket::new(Vec3x8::ZERO, Vec3x8::splat([1.0; 3]), Float8::ZERO, Mask8::NONE),
-        };
         let common = match light.toward {
             Toward::Point(position) => Some(position),
             Toward::Direction(_) => None,
         };
-        let packets: [RayPacket; PACKETS] = std::array::from_fn(packet);
-        let mut tile = Tile::new(packets, common);
+        let dead = RayPacket::new(Vec3x8::ZERO, Vec3x8::splat([1.0; 3]), Float8::ZERO, Mask8::NONE);
+        let mut tile = sink.room.tile(common);
+        for (p, packet) in tile.packets.iter_mut().enumerate() {
+            *packet = shaded[p].as_ref().map_or(dead, |shaded| shaded.shadow_rays(light, Mask8::from_bits(lit[p])));
+        }
+        let told = R::ON.then(|| tile.packets);
         let redecided = sink.room.walk.counts.redecided;
         self.tree.occluded_tile(&mut tile, &mut sink.room.walk);
         let counts = &mut sink.room.rays;
@@ -80,7 +80,7 @@ impl Direct<'_> {
             let bright = *lit & tile.packets[p].live().bits();
             counts.rays[RayKind::Shadow as usize] += u64::from(lit.count_ones());
             counts.hits[RayKind::Shadow as usize] += u64::from((*lit & !bright).count_ones());
-            if R::ON {
+            if let Some(packets) = &told {
                 for i in lanes(*lit) {
                     let dark = bright >> i & 1 == 0;
                     sink.record.shadow(index, packets[p].lane(i), dark, wave.slot(p, i), wave.paths[p][i]);
@@ -88,6 +88,7 @@ impl Direct<'_> {
             }
             *lit = bright;
         }
+        sink.room.tiles.push(tile);
     }
 }
 

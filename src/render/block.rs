@@ -1,9 +1,10 @@
 //! The unit of scheduling: a small square of pixels, all of their samples.
 
-use crate::accel::{PACKETS, Tile};
+use crate::accel::PACKETS;
 use crate::film::{Picture, Window};
-use crate::integrate::{CameraRays, Direct, ExactRays, RayKind, Record, Room, Samples, Samples8};
+use crate::integrate::{CameraRays, Direct, RayKind, Record, Room, Samples, Samples8, Wave};
 use crate::lanes::LANES;
+use crate::sample::Pattern;
 
 /// Pixels along an edge.
 const EDGE: i32 = 32;
@@ -55,8 +56,7 @@ impl Block {
                 record.tile(&mut pending.samples());
             }
             let met = room.rays.hits[RayKind::Camera as usize];
-            let (tile, exact) = pending.rays(rays, direct.scatters());
-            let samples = direct.radiance(tile, exact, room, record);
+            let samples = direct.radiance(pending.wave(rays, direct.scatters(), room), room, record);
             pending.add_to(&samples, &mut sums);
             tiles += 1;
             background_tiles += u64::from(room.rays.hits[RayKind::Camera as usize] == met);
@@ -65,9 +65,9 @@ impl Block {
         for code in 0..(EDGE * EDGE) as u32 {
             let (x, y) = (window.x0 + compact(code), window.y0 + compact(code >> 1));
             let Some(index) = window.index(x, y) else { continue };
-            let key = rays.key(x, y);
+            let pattern = rays.pattern(x, y);
             for sample in 0..spp {
-                pending.push((x, y, key, sample), index);
+                pending.push((x, y, pattern, sample), index);
                 if pending.count == PACKETS * LANES {
                     flush(&mut pending, &mut room);
                 }
@@ -101,10 +101,10 @@ struct Pending {
 
 impl Pending {
     #[inline(always)]
-    fn push(&mut self, sample: (i32, i32, u32, u32), pixel: usize) {
+    fn push(&mut self, sample: (i32, i32, Pattern, u32), pixel: usize) {
         let (p, i) = (self.count / LANES, self.count % LANES);
         let samples = &mut self.samples[p];
-        (samples.x[i], samples.y[i], samples.key[i], samples.index[i]) = sample;
+        (samples.x[i], samples.y[i], samples.pattern[i], samples.index[i]) = sample;
         self.pixels[p][i] = pixel as u32;
         self.count += 1;
     }
@@ -118,11 +118,17 @@ impl Pending {
         (0..self.count).map(lane).map(|(samples, i)| (samples.x[i], samples.y[i], samples.index[i]))
     }
 
-    fn rays(&self, rays: &CameraRays, keep_exact: bool) -> (Tile, Option<Box<ExactRays>>) {
+    fn wave(&self, rays: &CameraRays, keep_exact: bool, room: &mut Room) -> Wave {
         let count = |p: usize| self.count.saturating_sub(p * LANES).min(LANES);
-        let exact: ExactRays = std::array::from_fn(|p| rays.exact(&self.samples[p]));
-        let packets = std::array::from_fn(|p| rays.packet(&exact[p], count(p)));
-        (Tile::new(packets, rays.common_origin()), keep_exact.then(|| Box::new(exact)))
+        let mut wave = Wave::camera(room.tile(rays.common_origin()), keep_exact);
+        for (p, samples) in self.samples.iter().enumerate() {
+            let exact = rays.exact(samples);
+            wave.tile.packets[p] = rays.packet(&exact, count(p));
+            if let Some(kept) = &mut wave.exact {
+                kept[p] = exact;
+            }
+        }
+        wave
     }
 
     fn add_to(&self, samples: &Samples, sums: &mut [[f64; 4]]) {

@@ -88,6 +88,17 @@ pub struct Surface8 {
     pub error: Float8,
 }
 
+impl Surface8 {
+    /// With the lanes of `mask` from `other`.
+    fn with(&self, mask: Mask8, other: &Surface8) -> Surface8 {
+        Surface8 {
+            point: Vec3x8::select(mask, other.point, self.point),
+            normal: Vec3x8::select(mask, other.normal, self.normal),
+            error: mask.select(other.error, self.error),
+        }
+    }
+}
+
 /// One hit point to f64 accuracy.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Surface64 {

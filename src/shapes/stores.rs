@@ -22,6 +22,8 @@ pub struct Stores {
     turned_boxes: TurnedBoxes,
     cylinders: Cylinders,
     cones: Cones,
+    /// By kind and row.
+    owners: Vec<Vec<Owner>>,
 }
 
 /// Work on the store of a kind that is known at run time: compiled once for every kind.
@@ -35,7 +37,7 @@ pub trait Visit {
 impl Stores {
     /// Stores the parts in their order; `visible` tells which sides of a material are seen.
     pub fn new(parts: Parts, visible: &[Visible]) -> Self {
-        Stores {
+        let mut stores = Stores {
             spheres: store(parts.spheres, visible),
             planes: store(parts.planes, visible),
             disks: store(parts.disks, visible),
@@ -46,7 +48,10 @@ impl Stores {
             turned_boxes: store(parts.turned_boxes, visible),
             cylinders: store(parts.cylinders, visible),
             cones: store(parts.cones, visible),
-        }
+            owners: Vec::new(),
+        };
+        stores.owners = Kind::ALL.iter().map(|kind| stores.visit(*kind, Owners)).collect();
+        stores
     }
 
     /// Sends a visitor to the store of a kind.
@@ -72,8 +77,9 @@ impl Stores {
     }
 
     /// Whose part a row is.
+    #[inline(always)]
     pub fn owner(&self, kind: Kind, row: usize) -> Owner {
-        self.visit(kind, OwnerOf(row))
+        self.owners[kind as usize][row]
     }
 
     /// Which of two rows wins where both are met at the same `t`: the primitive of the lowest index, and
@@ -91,19 +97,18 @@ impl Stores {
     pub fn surface(&self, hits: Float8, rays: &RayPacket, t: Float8) -> Surface8 {
         let hits = hits.to_array().map(RowRef::from_lane);
         let mut surface = Surface8 { point: Vec3x8::ZERO, normal: Vec3x8::ZERO, error: Float8::ZERO };
-        let mut left: u32 = (0..LANES).filter(|lane| hits[*lane] != RowRef::MISS).map(|lane| 1 << lane).sum();
-        while left != 0 {
-            let Some(kind) = hits[left.trailing_zeros() as usize].kind() else { break };
-            let same: u32 = (0..LANES).filter(|lane| hits[*lane].kind() == Some(kind)).map(|lane| 1 << lane).sum();
-            let rows = hits.map(|hit| if hit.kind() == Some(kind) { hit.row() as u32 } else { 0 });
+        let mut done = 0u32;
+        for hit in hits {
+            let Some(kind) = hit.kind().filter(|kind| done >> *kind as u32 & 1 == 0) else { continue };
+            let (mut rows, mut same) = ([0; LANES], 0);
+            for (lane, hit) in hits.into_iter().enumerate() {
+                let is_same = hit.is_of(kind);
+                rows[lane] = if is_same { hit.row() as u32 } else { 0 };
+                same |= u32::from(is_same) << lane;
+            }
             let found = self.visit(kind, SurfaceOf { rows, rays, t });
-            let mask = Mask8::from_bits(same);
-            surface = Surface8 {
-                point: Vec3x8::select(mask, found.point, surface.point),
-                normal: Vec3x8::select(mask, found.normal, surface.normal),
-                error: mask.select(found.error, surface.error),
-            };
-            left &= !same;
+            surface = if done == 0 { found } else { surface.with(Mask8::from_bits(same), &found) };
+            done |= 1 << kind as u32;
         }
         surface
     }
@@ -125,7 +130,8 @@ impl Stores {
 
     /// Memory of the columns in bytes.
     pub fn column_bytes(&self) -> usize {
-        Kind::ALL.iter().map(|kind| self.visit(*kind, ColumnBytes)).sum()
+        let owners = self.owners.iter().map(|owners| owners.capacity() * size_of::<Owner>()).sum::<usize>();
+        owners + Kind::ALL.iter().map(|kind| self.visit(*kind, ColumnBytes)).sum::<usize>()
     }
 }
 
@@ -156,6 +162,12 @@ impl RowRef {
         Kind::ALL.get((self.0 >> 28) as usize).copied()
     }
 
+    /// Whether it is of a kind.
+    #[inline(always)]
+    pub fn is_of(self, kind: Kind) -> bool {
+        self.0 >> 28 == kind as u32
+    }
+
     /// Its row in the store of its kind.
     #[inline(always)]
     pub fn row(self) -> usize {
@@ -184,12 +196,12 @@ impl Visit for Count {
     }
 }
 
-struct OwnerOf(usize);
+struct Owners;
 
-impl Visit for OwnerOf {
-    type Output = Owner;
-    fn visit<S: Store>(self, store: &S) -> Owner {
-        S::owner(&store.parts()[self.0])
+impl Visit for Owners {
+    type Output = Vec<Owner>;
+    fn visit<S: Store>(self, store: &S) -> Vec<Owner> {
+        store.parts().iter().map(S::owner).collect()
     }
 }
 
