@@ -45,3 +45,33 @@ fn the_engine_agrees_with_the_reference_on_every_nff_scene() {
     let failures: Vec<String> = paths.iter().filter_map(|path| failure(path, &load(path), 16)).collect();
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
+
+/// What f32 is bad at: spheres far larger than what stands on them, and the insides of tips.
+#[test]
+fn the_engine_agrees_with_the_reference_where_f32_is_bad() {
+    let view = "[image]\nwidth = 96\nheight = 72\n[background]\ncolor = [0.4, 0.5, 0.6]\n\
+        [materials.clay]\ntype = \"diffuse\"\n[materials.mirror]\ntype = \"mirror\"\n";
+    let ground = |radius: f64| {
+        format!(
+            "{view}[camera]\ntype = \"pinhole\"\neye = [0, 1, 4]\ntarget = [0, 0.6, 0]\nvfov = 50\n\
+            [[lights]]\ntype = \"point\"\nposition = [3, 5, 2]\nintensity = [90, 90, 90]\n\
+            [[shapes]]\ntype = \"sphere\"\ncenter = [0, -{radius}, 0]\nradius = {radius}\nmaterial = \"clay\"\n\
+            [[shapes]]\ntype = \"sphere\"\ncenter = [0, 0.7, 0]\nradius = 0.7\nmaterial = \"clay\"\n"
+        )
+    };
+    let tip = |apex_radius: f64| {
+        format!(
+            "{view}[render]\nmax_depth = 12\n[camera]\ntype = \"pinhole\"\neye = [0, 0.5, 0]\ntarget = [0, 0.7, -0.1]\n\
+            vfov = 100\n[[lights]]\ntype = \"point\"\nposition = [0.1, 0, 0]\nintensity = [3, 3, 3]\n\
+            [[shapes]]\ntype = \"cone\"\nbase = [0, -1, 0]\napex = [0, 1, 0]\nradius = 1\n\
+            apex_radius = {apex_radius}\nmaterial = \"mirror\"\n"
+        )
+    };
+    let cases = [1e3, 1e5, 1e7].map(ground).into_iter().chain([0.0, 1e-4].map(tip));
+    let check = |(index, text): (usize, String)| {
+        let scene = Scene::from_toml(&text, Path::new(".")).unwrap_or_else(|errors| panic!("{errors}"));
+        failure(Path::new(&format!("case {index}")), &scene, 5000)
+    };
+    let failures: Vec<String> = cases.enumerate().filter_map(check).collect();
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}

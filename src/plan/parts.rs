@@ -189,6 +189,15 @@ impl TurnedBoxPart {
 }
 
 impl ConePart {
+    /// Centre of the narrower end and the unit axis from there to the wider one: where the radius comes near
+    /// zero, heights must too, or nothing of it is left in f32.
+    pub fn narrow_end(&self) -> (DVec3, DVec3) {
+        match self.apex_radius < self.radius {
+            true => (self.base + self.axis * self.height, -self.axis),
+            false => (self.base, self.axis),
+        }
+    }
+
     /// Change of the radius per unit of height.
     pub fn slope(&self) -> f64 {
         (self.apex_radius - self.radius) / self.height

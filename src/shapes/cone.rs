@@ -12,11 +12,11 @@ use crate::scene::Visible;
 /// All cones of a render.
 #[derive(Debug)]
 pub struct Cones {
-    base: Column3,  // scene units
-    axis: Column3,  // unit, from base to apex
+    tip: Column3,   // centre of the narrower end, scene units
+    axis: Column3,  // unit, from there to the wider end
     height: Column, // scene units, > 0
-    radius: Column, // at the base, scene units, >= 0
-    slope: Column,  // change of the radius per unit of height
+    radius: Column, // at the narrower end, scene units, >= 0
+    slope: Column,  // growth of the radius per unit of height, > 0
     sides: Sides,
     parts: Vec<ConePart>,
 }
@@ -24,7 +24,7 @@ pub struct Cones {
 /// Eight rows.
 #[derive(Debug, Clone, Copy)]
 pub struct Row {
-    base: Vec3x8,
+    tip: Vec3x8,
     axis: Vec3x8,
     height: Float8,
     radius: Float8,
@@ -35,7 +35,8 @@ pub struct Row {
 /// Eight rows seen from eight origins.
 #[derive(Debug, Clone, Copy)]
 pub struct Anchor {
-    f: Vec3x8, // from the origin to the base
+    f: Vec3x8,     // from the origin to the tip
+    error: Float8, // of f, the rounding of the scene included
     axis: Vec3x8,
     height: Float8,
     radius: Float8,
@@ -49,12 +50,12 @@ impl Store for Cones {
     type Anchor = Anchor;
 
     fn new(parts: Vec<ConePart>, sides: Sides) -> Self {
-        let base = Column3::new(parts.iter().map(|part| part.base));
-        let axis = Column3::new(parts.iter().map(|part| part.axis));
+        let tip = Column3::new(parts.iter().map(|part| part.narrow_end().0));
+        let axis = Column3::new(parts.iter().map(|part| part.narrow_end().1));
         let height = column_of(&parts, |part| part.height);
-        let radius = column_of(&parts, |part| part.radius);
-        let slope = column_of(&parts, ConePart::slope);
-        Cones { base, axis, height, radius, slope, sides, parts }
+        let radius = column_of(&parts, |part| part.radius.min(part.apex_radius));
+        let slope = column_of(&parts, |part| part.slope().abs());
+        Cones { tip, axis, height, radius, slope, sides, parts }
     }
 
     fn parts(&self) -> &[ConePart] {
@@ -63,51 +64,40 @@ impl Store for Cones {
 
     #[inline(always)]
     fn splat(&self, i: usize) -> Row {
-        let (base, axis, height) = (self.base.splat(i), self.axis.splat(i), self.height.splat(i));
-        Row {
-            base,
-            axis,
-            height,
-            radius: self.radius.splat(i),
-            slope: self.slope.splat(i),
-            hidden: self.sides.splat(i),
-        }
+        let (tip, axis, height) = (self.tip.splat(i), self.axis.splat(i), self.height.splat(i));
+        Row { tip, axis, height, radius: self.radius.splat(i), slope: self.slope.splat(i), hidden: self.sides.splat(i) }
     }
 
     #[inline(always)]
     fn block(&self, i: usize) -> Row {
-        let (base, axis, height) = (self.base.block(i), self.axis.block(i), self.height.block(i));
-        Row {
-            base,
-            axis,
-            height,
-            radius: self.radius.block(i),
-            slope: self.slope.block(i),
-            hidden: self.sides.block(i),
-        }
+        let (tip, axis, height) = (self.tip.block(i), self.axis.block(i), self.height.block(i));
+        Row { tip, axis, height, radius: self.radius.block(i), slope: self.slope.block(i), hidden: self.sides.block(i) }
     }
 
     fn gather(&self, rows: [u32; LANES]) -> Row {
         let hidden = self.sides.lanes(|lane| rows[lane] as usize);
-        let (base, axis, height) = (self.base.gather(rows), self.axis.gather(rows), self.height.gather(rows));
-        Row { base, axis, height, radius: self.radius.gather(rows), slope: self.slope.gather(rows), hidden }
+        let (tip, axis, height) = (self.tip.gather(rows), self.axis.gather(rows), self.height.gather(rows));
+        Row { tip, axis, height, radius: self.radius.gather(rows), slope: self.slope.gather(rows), hidden }
     }
 
     #[inline(always)]
     fn anchor(row: &Row, origin: &Vec3x8) -> Anchor {
-        let Row { base, axis, height, radius, slope, hidden } = *row;
-        Anchor { f: base - *origin, axis, height, radius, slope, hidden }
+        let Row { tip, axis, height, radius, slope, hidden } = *row;
+        let f = tip - *origin;
+        let reach = tip.abs() + f.abs();
+        let error = roundings(4.0) * (reach.x + reach.y + reach.z);
+        Anchor { f, error, axis, height, radius, slope, hidden }
     }
 
     /// Points at height `w` and distance `rho` from the axis with `rho = radius + slope w`, a quadratic in
-    /// t from the ray's point nearest the base; its discriminant from compensated products, its roots by
+    /// t from the ray's point nearest the narrower end; its discriminant from compensated products, its roots by
     /// quotient and product. Heights outside 0..height drop the mirror cone as well. Along the way the
     /// sign of `A t + B` says which side of the mantle a root meets.
     #[inline(always)]
     fn hit<const CULL: bool>(anchor: &Anchor, rays: &RayPacket) -> Hit8 {
-        let Anchor { f, axis, height, radius, slope, hidden } = *anchor;
+        let Anchor { f, error, axis, height, radius, slope, hidden } = *anchor;
         let p = f.dot(rays.dir) * rays.inv_dd;
-        let g = rays.dir.mul_add(p, -f); // from the base to the nearest point
+        let g = rays.dir.mul_add(p, -f); // from the tip to the nearest point
         let (gw, dw) = (g.dot(axis), rays.dir.dot(axis));
         let (gx, dx) = (axis.mul_add(-gw, g), axis.mul_add(-dw, rays.dir));
         let (rho, turn) = (slope.mul_add(gw, radius), slope * dw);
@@ -115,12 +105,24 @@ impl Store for Cones {
         let b = dx.dot(gx) - turn * rho;
         let c = gx.dot(gx) - rho * rho;
         let disc = difference_of_products(b, b, a, c);
-        if !Mask8::ge(disc, Float8::ZERO).any() {
+        let (speed2, size) = (turn.mul_add(turn, dx.dot(dx)), rho.mul_add(rho, gx.dot(gx)).sqrt());
+        let bound = speed2 * size * float8(6.0).mul_add(error, roundings(20.0) * size);
+        let possible = Mask8::ge(disc, -bound);
+        if !possible.any() {
             return Hit8::none();
         }
         let root = copysign(disc.sqrt(), b);
         let z = -(b + root);
         let (t1, t2) = (z / a, c / z);
+        // Within this of its ends a mantle may or may not be met.
+        let rim = float8(2.0).mul_add(error, roundings(16.0) * (size + height))
+            + (dw.abs() * bound) / (speed2 * root.abs()).fast_max(float8(f32::MIN_POSITIVE));
+        let at_rim = |t: Float8| {
+            let w = t.mul_add(dw, gw);
+            rays.accepts(p + t) & (Mask8::le(w.abs(), rim) | Mask8::le((w - height).abs(), rim))
+        };
+        let silhouette = Mask8::le(disc.abs(), bound) & Mask8::gt(p + size / speed2.sqrt(), rays.t_min);
+        let doubt = silhouette | at_rim(t1) | at_rim(t2);
         // A t + B is -root at t1 and +root at t2: negative where the ray goes in.
         let first_enters = !Mask8::sign(root);
         let ok = |t: Float8, enters: Mask8| {
@@ -134,7 +136,7 @@ impl Store for Cones {
         let (ok1, ok2) = (ok(t1, first_enters), ok(t2, !first_enters));
         let far = float8(f32::INFINITY);
         let t = p + ok1.select(t1, far).fast_min(ok2.select(t2, far));
-        Hit8 { t, mask: ok1 | ok2, doubt: Mask8::NONE }
+        Hit8 { t, mask: (ok1 | ok2) & !doubt, doubt }
     }
 
     fn decide(part: &ConePart, ray: &Ray64, visible: Visible) -> Option<f64> {
@@ -154,27 +156,27 @@ impl Store for Cones {
         let t = nearer(a, b, t);
         let from_base = ray.at(t) - part.base;
         let w = from_base.dot(part.axis);
-        // At the tip there is no radial direction; the axis stands in for it.
+        // At the tip there is no radial direction; the way out along the axis stands in for it.
         let radial = (from_base - part.axis * w).try_normalize();
-        let normal = (radial.unwrap_or(part.axis) - part.axis * part.slope()).normalize();
+        let normal = (radial.unwrap_or(-part.narrow_end().1) - part.axis * part.slope()).normalize();
         let rho = (part.radius + part.slope() * w).max(0.0);
         Surface64 { t, point: part.base + part.axis * w + radial.unwrap_or_default() * rho, normal }
     }
 
     fn surface(row: &Row, rays: &RayPacket, t: Float8) -> Surface8 {
-        let f = row.base - rays.origin;
+        let f = row.tip - rays.origin;
         let p = f.dot(rays.dir) * rays.inv_dd;
-        let from_base = rays.dir.mul_add(t - p, rays.dir.mul_add(p, -f));
-        let w = from_base.dot(row.axis);
-        let radial = row.axis.mul_add(-w, from_base);
+        let from_tip = rays.dir.mul_add(t - p, rays.dir.mul_add(p, -f));
+        let w = from_tip.dot(row.axis);
+        let radial = row.axis.mul_add(-w, from_tip);
         let length = radial.length();
-        // At the tip there is no radial direction; the axis stands in for it.
+        // At the tip there is no radial direction; the way out along the axis stands in for it.
         let at_tip = !Mask8::gt(length, Float8::ZERO);
-        let radial = Vec3x8::select(at_tip, row.axis, radial * (float8(1.0) / length));
+        let radial = Vec3x8::select(at_tip, -row.axis, radial * (float8(1.0) / length));
         let normal = row.axis.mul_add(-row.slope, radial).normalize();
         let rho = row.slope.mul_add(w, row.radius).fast_max(Float8::ZERO);
-        let point = radial.mul_add(at_tip.select(Float8::ZERO, rho), row.axis.mul_add(w, row.base));
-        let reach = row.base.abs();
+        let point = radial.mul_add(at_tip.select(Float8::ZERO, rho), row.axis.mul_add(w, row.tip));
+        let reach = row.tip.abs();
         let size = row.height + row.radius + rho;
         let error = roundings(6.0) * (reach.x + reach.y + reach.z + size);
         Surface8 { point, normal, error }
@@ -202,7 +204,7 @@ impl Store for Cones {
 
     fn column_bytes(&self) -> usize {
         let scalars = [&self.height, &self.radius, &self.slope];
-        self.base.bytes() + self.axis.bytes() + scalars.iter().map(|column| column.bytes()).sum::<usize>()
+        self.tip.bytes() + self.axis.bytes() + scalars.iter().map(|column| column.bytes()).sum::<usize>()
     }
 }
 

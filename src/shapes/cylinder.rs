@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 
 use super::sphere::copysign;
 use super::{Hidden8, Ray64, Sides, Store, Surface8, Surface64, column_of, nearer, roundings};
-use crate::lanes::{Column, Column3, Float8, Hit8, LANES, Mask8, RayPacket, Vec3x8};
+use crate::lanes::{Column, Column3, Float8, Hit8, LANES, Mask8, RayPacket, Vec3x8, float8};
 use crate::plan::{CylinderPart, Owner};
 use crate::scene::{Visible, basis};
 
@@ -38,6 +38,8 @@ pub struct Anchor {
     axis: Vec3x8,
     height: Float8,
     r2: Float8,
+    error: Float8, // of f, the rounding of the scene included
+    bound: Float8, // of the slack below
     hidden: Hidden8,
 }
 
@@ -79,7 +81,11 @@ impl Store for Cylinders {
     #[inline(always)]
     fn anchor(row: &Row, origin: &Vec3x8) -> Anchor {
         let f = row.base - *origin;
-        Anchor { f, axis: row.axis, height: row.height, r2: row.radius * row.radius, hidden: row.hidden }
+        let reach = row.base.abs() + f.abs();
+        let error = roundings(6.0) * (reach.x + reach.y + reach.z + row.height);
+        let r2 = row.radius * row.radius;
+        let bound = (row.radius + row.radius).mul_add(error, error * error) + roundings(24.0) * r2;
+        Anchor { f, axis: row.axis, height: row.height, r2, error, bound, hidden: row.hidden }
     }
 
     /// The sphere's test in the plane across the axis, from the ray's point nearest the base, where the
@@ -88,7 +94,7 @@ impl Store for Cylinders {
     /// Source: after Haines, Günther and Akenine-Möller, Ray Tracing Gems, 2019, chapter 7.
     #[inline(always)]
     fn hit<const CULL: bool>(anchor: &Anchor, rays: &RayPacket) -> Hit8 {
-        let Anchor { f, axis, height, r2, hidden } = *anchor;
+        let Anchor { f, axis, height, r2, error, bound, hidden } = *anchor;
         let p = f.dot(rays.dir) * rays.inv_dd;
         let q = rays.dir.mul_add(-p, f);
         let (da, qa) = (rays.dir.dot(axis), q.dot(axis));
@@ -96,23 +102,33 @@ impl Store for Cylinders {
         let (qd, dd) = (q2.dot(d2), d2.dot(d2));
         let perp = d2.mul_add(-(qd / dd), q2);
         let slack = r2 - perp.dot(perp);
-        if !Mask8::ge(slack, Float8::ZERO).any() {
+        if !Mask8::ge(slack, -bound).any() {
             return Hit8::none();
         }
-        let z = qd + copysign((slack * dd).sqrt(), qd);
+        let s = (slack * dd).sqrt();
+        let z = qd + copysign(s, qd);
         let (a, b) = (z / dd, (q2.dot(q2) - r2) / z);
         let (entry, exit) = (a.fast_min(b), a.fast_max(b));
         let within = |t: Float8| {
             let w = t.mul_add(da, -qa);
             Mask8::ge(w, Float8::ZERO) & Mask8::le(w, height)
         };
+        // Within this of its ends a mantle may or may not be met.
+        let rim = error + roundings(16.0) * height + (da.abs() * bound) / s.fast_max(float8(f32::MIN_POSITIVE));
+        let at_rim = |t: Float8| {
+            let w = t.mul_add(da, -qa);
+            rays.accepts(p + t) & (Mask8::le(w.abs(), rim) | Mask8::le((w - height).abs(), rim))
+        };
+        let middle = qd / dd;
+        let silhouette = Mask8::le(slack.abs(), bound) & Mask8::gt(p + middle + (bound / dd).sqrt(), rays.t_min);
+        let doubt = silhouette | at_rim(entry) | at_rim(exit);
         let mut entry_ok = rays.accepts(p + entry) & within(entry);
         let mut exit_ok = rays.accepts(p + exit) & within(exit);
         if CULL {
             entry_ok &= !hidden.front;
             exit_ok &= !hidden.back;
         }
-        Hit8 { t: entry_ok.select(p + entry, p + exit), mask: entry_ok | exit_ok, doubt: Mask8::NONE }
+        Hit8 { t: entry_ok.select(p + entry, p + exit), mask: (entry_ok | exit_ok) & !doubt, doubt }
     }
 
     fn decide(part: &CylinderPart, ray: &Ray64, visible: Visible) -> Option<f64> {

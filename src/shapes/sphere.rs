@@ -14,8 +14,10 @@ use crate::scene::Visible;
 /// All spheres of a render.
 #[derive(Debug)]
 pub struct Spheres {
-    center: Column3, // scene units
-    radius: Column,  // scene units, > 0
+    center: Column3,     // scene units
+    radius: Column,      // scene units, > 0
+    center_low: Column3, // what rounding took from the center
+    radius_low: Column,  // and from the radius
     sides: Sides,
     parts: Vec<SpherePart>,
 }
@@ -25,6 +27,8 @@ pub struct Spheres {
 pub struct Row {
     center: Vec3x8,
     radius: Float8,
+    center_low: Vec3x8,
+    radius_low: Float8,
     hidden: Hidden8,
 }
 
@@ -47,7 +51,10 @@ impl Store for Spheres {
     fn new(parts: Vec<SpherePart>, sides: Sides) -> Self {
         let center = Column3::new(parts.iter().map(|part| part.center));
         let radius = column_of(&parts, |part| part.radius);
-        Spheres { center, radius, sides, parts }
+        let low = |x: f64| x - f64::from(x as f32);
+        let center_low = Column3::new(parts.iter().map(|part| DVec3::from_array(part.center.to_array().map(low))));
+        let radius_low = column_of(&parts, |part| low(part.radius));
+        Spheres { center, radius, center_low, radius_low, sides, parts }
     }
 
     fn parts(&self) -> &[SpherePart] {
@@ -56,17 +63,35 @@ impl Store for Spheres {
 
     #[inline(always)]
     fn splat(&self, i: usize) -> Row {
-        Row { center: self.center.splat(i), radius: self.radius.splat(i), hidden: self.sides.splat(i) }
+        Row {
+            center: self.center.splat(i),
+            radius: self.radius.splat(i),
+            center_low: self.center_low.splat(i),
+            radius_low: self.radius_low.splat(i),
+            hidden: self.sides.splat(i),
+        }
     }
 
     #[inline(always)]
     fn block(&self, first: usize) -> Row {
-        Row { center: self.center.block(first), radius: self.radius.block(first), hidden: self.sides.block(first) }
+        Row {
+            center: self.center.block(first),
+            radius: self.radius.block(first),
+            center_low: self.center_low.block(first),
+            radius_low: self.radius_low.block(first),
+            hidden: self.sides.block(first),
+        }
     }
 
     fn gather(&self, rows: [u32; LANES]) -> Row {
         let hidden = self.sides.lanes(|lane| rows[lane] as usize);
-        Row { center: self.center.gather(rows), radius: self.radius.gather(rows), hidden }
+        Row {
+            center: self.center.gather(rows),
+            radius: self.radius.gather(rows),
+            center_low: self.center_low.gather(rows),
+            radius_low: self.radius_low.gather(rows),
+            hidden,
+        }
     }
 
     #[inline(always)]
@@ -76,7 +101,7 @@ impl Store for Spheres {
         let near = Mask8::lt((ff - r2).abs(), r2);
         let mut c = ff - r2;
         if near.any() {
-            c = near.select(square_sum_minus(f.x, f.y, f.z, row.radius), c);
+            c = near.select(row.height_product(f, origin), c);
         }
         // |c| rounds with the scene, f with the subtraction; 1-norms stand for lengths.
         let reach = row.center.abs() + f.abs();
@@ -151,10 +176,15 @@ impl Store for Spheres {
         let p = f.dot(rays.dir) * rays.inv_dd;
         let perp = rays.dir.mul_add(-p, f);
         let normal = rays.dir.mul_add(t - p, -perp).normalize();
+        let norm = |v: Vec3x8| (v.abs().x + v.abs().y) + v.abs().z;
+        let by_center = roundings(6.0) * (norm(row.center) + row.radius);
+        let way = rays.dir * t;
+        let by_ray = roundings(6.0) * (norm(rays.origin) + norm(way) + norm(way));
+        // A sphere that is large beside the ray has a center too far away to start from.
+        let along = Mask8::lt(by_ray, by_center);
         let point = normal.mul_add(row.radius, row.center);
-        let reach = row.center.abs();
-        let error = roundings(6.0) * (reach.x + reach.y + reach.z + row.radius);
-        Surface8 { point, normal, error }
+        let point = Vec3x8::select(along, rays.dir.mul_add(t, rays.origin), point);
+        Surface8 { point, normal, error: along.select(by_ray, by_center) }
     }
 
     fn uv(part: &SpherePart, point: DVec3) -> DVec2 {
@@ -176,7 +206,25 @@ impl Store for Spheres {
     }
 
     fn column_bytes(&self) -> usize {
-        self.center.bytes() + self.radius.bytes()
+        self.center.bytes() + self.radius.bytes() + self.center_low.bytes() + self.radius_low.bytes()
+    }
+}
+
+impl Row {
+    /// `|f|^2 - r^2` where both are nearly the same, with what rounding took from the center, the radius and
+    /// `f` itself: beside a huge sphere that is more than the height above it.
+    fn height_product(&self, f: Vec3x8, origin: &Vec3x8) -> Float8 {
+        let lost = |c: Float8, o: Float8, f: Float8| {
+            let o_part = c - f;
+            (c - (f + o_part)) + (o_part - o)
+        };
+        let low = Vec3x8::new(
+            lost(self.center.x, origin.x, f.x),
+            lost(self.center.y, origin.y, f.y),
+            lost(self.center.z, origin.z, f.z),
+        ) + self.center_low;
+        let rest = f.dot(low) - self.radius * self.radius_low;
+        square_sum_minus(f.x, f.y, f.z, self.radius) + (rest + rest)
     }
 }
 
