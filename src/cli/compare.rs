@@ -55,7 +55,7 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
         if Format::of(path) != Some(Format::Png) {
             return Err(Failure::new(Exit::Usage, format!("{}: a heat map should end in .png", path.display())));
         }
-        run.check_output(path)?;
+        run.check_output(path, &[&args.a, &args.b])?;
     }
     let (a, b) = (output::read(&args.a)?, output::read(&args.b)?);
     let comparison = compare(&a, &b)?;

@@ -39,10 +39,6 @@ enum Kind {
 pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
     let (input, output) = (&args.input, &args.output);
     let usage = |path: &Path, text: &str| Failure::new(Exit::Usage, text).of(path);
-    let same = |a: &Path, b: &Path| a == b || a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
-    if same(input, output) {
-        return Err(usage(output, "is the input as well: the output should be another file"));
-    }
     match (kind(input), kind(output)) {
         (None, _) => Err(usage(input, "unknown kind of file: should end in .toml, .nff, .nff.gz, .exr or .png")),
         (Some(Kind::Picture), Some(Kind::Picture)) => convert_picture(args, run),
@@ -70,7 +66,7 @@ fn convert_scene(args: &Args, run: &Run) -> Result<Exit, Failure> {
     if args.depth.is_given() {
         return Err(Failure::new(Exit::Usage, "--float and --bits are for pictures, not for scenes"));
     }
-    run.check_output(&args.output)?;
+    run.check_output(&args.output, &[&args.input])?;
     let scene = scene_file::load(&args.input, run)?.scene;
     let saved = run.signals.undisturbed(|| write::save(&scene, &args.output));
     saved.map_err(|error| Failure::output(&args.output, &error))?;
@@ -78,7 +74,7 @@ fn convert_scene(args: &Args, run: &Run) -> Result<Exit, Failure> {
 }
 
 fn convert_picture(args: &Args, run: &Run) -> Result<Exit, Failure> {
-    let target = Target::new(&args.output, run)?;
+    let target = Target::new(&args.output, &[&args.input], run)?;
     let options = args.depth.options(&target)?;
     let picture = output::read(&args.input)?;
     pictures::write(&picture, &target, options, &Description::default(), run)?;

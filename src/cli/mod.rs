@@ -103,7 +103,15 @@ pub struct Run {
 
 impl Run {
     /// Makes sure, before any work, that a file can be written.
-    fn check_output(&self, path: &Path) -> Result<(), Failure> {
+    fn check_output(&self, path: &Path, inputs: &[&Path]) -> Result<(), Failure> {
+        let same = |input: &&&Path| {
+            path == **input
+                || path.canonicalize().is_ok_and(|path| input.canonicalize().is_ok_and(|input| path == input))
+        };
+        if inputs.iter().find(same).is_some() {
+            let text = "is an input as well: the output should be another file";
+            return Err(Failure::new(Exit::Usage, text).of(path));
+        }
         Ok(self.signals.undisturbed(|| aside::check(path))?)
     }
 

@@ -32,14 +32,14 @@ pub enum Target {
 
 impl Target {
     /// A file name, or `-`; makes sure that it can be written, so that no work is done in vain.
-    pub fn new(path: &Path, run: &Run) -> Result<Self, Failure> {
+    pub fn new(path: &Path, inputs: &[&Path], run: &Run) -> Result<Self, Failure> {
         if path.as_os_str() == "-" {
             return match io::stdout().is_terminal() {
                 true => Err(Failure::new(Exit::Usage, "an EXR file is nothing for a terminal: say -o FILE")),
                 false => Ok(Target::Stdout),
             };
         }
-        run.check_output(path)?;
+        run.check_output(path, inputs)?;
         let format = Format::of(path).or_else(|| is_device(path).then_some(Format::Exr));
         let format = format.ok_or_else(|| OutputError::Format { path: path.into() })?;
         Ok(Target::File(path.into(), format))

@@ -69,9 +69,9 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
     if !npy {
         return Err(Failure::new(Exit::Usage, "unknown kind of file: hits should go to a .npy file").of(&args.output));
     }
-    run.check_output(&args.output)?;
+    run.check_output(&args.output, &[&args.scene, &args.rays])?;
     if let Some(stats) = &args.stats.stats {
-        run.check_output(stats)?;
+        run.check_output(stats, &[&args.scene, &args.rays, &args.output])?;
     }
     let loaded = scene_file::load(&args.scene, run)?;
     let rays = hits::read_rays(&args.rays)?;

@@ -96,13 +96,13 @@ impl From<IntegratorName> for Integrator {
 pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
     run.warn_of_build();
     let output = args.output.clone().unwrap_or_else(|| default_output(&args.scene));
-    let target = Target::new(&output, run)?;
+    let target = Target::new(&output, &[&args.scene], run)?;
     let options = args.depth.options(&target)?;
     if let Some(stats) = &args.stats.stats {
         if *stats == output {
             return Err(Failure::new(Exit::Usage, format!("{}: both the picture and --stats", stats.display())));
         }
-        run.check_output(stats)?;
+        run.check_output(stats, &[&args.scene])?;
     }
     let loaded = scene_file::load(&args.scene, run)?;
     let mut scene = loaded.scene;

@@ -35,6 +35,10 @@ impl Signals {
     /// Starts to watch. Where a signal cannot be caught, it ends the process as it always does.
     pub fn watch() -> Self {
         let signals = Signals::default();
+        let watch = signals.clone();
+        if thread::Builder::new().spawn(move || watch.wait()).is_err() {
+            return signals;
+        }
         let again = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM] {
             let number = usize::try_from(signal).unwrap_or_default();
@@ -43,8 +47,6 @@ impl Signals {
                 .and_then(|_| flag::register(signal, Arc::clone(&again)))
                 .and_then(|_| flag::register_usize(signal, Arc::clone(&signals.caught), number));
         }
-        let watch = signals.clone();
-        thread::spawn(move || watch.wait());
         signals
     }
 

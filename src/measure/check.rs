@@ -109,7 +109,7 @@ pub struct PictureReport {
     pub mean_difference: f64,
     /// Pixels off by more than [`VISIBLE`].
     pub visible: u64,
-    /// Whether anything mirrors or refracts, which decides the bounds in force.
+    /// Whether anything in use mirrors or refracts, which decides the bounds in force.
     pub scatters: bool,
 }
 
@@ -145,8 +145,7 @@ pub fn check(scene: &Scene, settings: &CheckSettings) -> Result<Report, RenderEr
     let pixels = judge.choose(window, settings);
     let tallies = pixels.par_iter().map(|(block, pixels)| judge.block(*block, pixels, settings.listed));
     let tally = tallies.reduce(Tally::default, |a, b| a.with(b, settings.listed));
-    let scatters = scene.materials.iter().any(|material| material.model.scatters());
-    Ok(tally.report(window.area() as u64, scatters, start.elapsed()))
+    Ok(tally.report(window.area() as u64, frame.scatters(), start.elapsed()))
 }
 
 struct Judge<'a, 's> {
@@ -175,7 +174,8 @@ impl Judge<'_, '_> {
             tried += 1;
         }
         let each = trial.elapsed().as_secs_f64() / tried as f64;
-        let affordable = settings.seconds * rayon::current_num_threads() as f64 / each;
+        // The first pixels were tried one by one; side by side they are slower, so not all of the time is planned for.
+        let affordable = 0.6 * settings.seconds * rayon::current_num_threads() as f64 / each;
         order.truncate((affordable as usize).max(16));
         let mut chosen: HashMap<(i32, i32), Vec<(i32, i32)>> = HashMap::new();
         let corner = |x: i32, y: i32| {

@@ -287,6 +287,11 @@ impl<'s> Frame<'s> {
         self.plan.origin
     }
 
+    /// Whether rays go on from some material in use.
+    pub fn scatters(&self) -> bool {
+        self.plan.scatters
+    }
+
     /// Its blocks: windows that are traced as one, of some hundred pixels.
     pub fn blocks(&self, window: Window) -> Vec<Window> {
         Block::cover(window).into_iter().map(|block| block.window).collect()

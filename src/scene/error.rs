@@ -159,7 +159,13 @@ impl Source {
     }
 
     fn named(&self) -> NamedSource<Arc<str>> {
-        NamedSource::new(self.path.display().to_string(), self.text.clone())
+        // A terminal must not obey what a broken file holds; the same number of bytes keeps all places.
+        let shows = |c: char| c == '\n' || c == '\t' || !c.is_ascii_control();
+        let text: Arc<str> = match self.text.chars().all(shows) {
+            true => self.text.clone(),
+            false => self.text.chars().map(|c| if shows(c) { c } else { '?' }).collect::<String>().into(),
+        };
+        NamedSource::new(self.path.display().to_string(), text)
     }
 
     /// What stands at `span`, shortened and on one line, for the `found` of an error.
@@ -176,7 +182,7 @@ pub fn shorten(text: &str) -> String {
         if !words.is_empty() {
             words.push(' ');
         }
-        words.extend(word.chars().take(LONGEST_QUOTE + 1).filter(|c| !c.is_control()));
+        words.extend(word.chars().take(LONGEST_QUOTE + 1).map(|c| if c.is_control() { '\u{fffd}' } else { c }));
         if words.len() > 4 * LONGEST_QUOTE {
             break;
         }
@@ -380,7 +386,7 @@ mod tests {
 
     #[test]
     fn long_values_are_cut() {
-        assert_eq!(shorten("a \t\n b\u{1b}"), "a b");
+        assert_eq!(shorten("a \t\n b\u{1b}"), "a b\u{fffd}");
         assert_eq!(shorten(&"µ".repeat(1000)), format!("{}...", "µ".repeat(LONGEST_QUOTE)));
         assert_eq!(shorten(&"x ".repeat(1000)).chars().count(), LONGEST_QUOTE + 3);
     }
