@@ -81,13 +81,10 @@ impl CameraRays {
         if self.centered {
             return points;
         }
-        let mut bits = [[0; LANES]; 2];
-        for lane in 0..LANES {
-            [bits[0][lane], bits[1][lane]] = samples.pattern[lane].sample(samples.index[lane]);
-        }
-        for (axis, bits) in points.iter_mut().zip(bits) {
-            for lane in 0..LANES {
-                axis[lane] += self.filter.offset(sample::unit(bits[lane]));
+        let bits: [[u32; 2]; LANES] = std::array::from_fn(|lane| samples.pattern[lane].sample(samples.index[lane]));
+        for (k, axis) in points.iter_mut().enumerate() {
+            for (x, bits) in axis.iter_mut().zip(&bits) {
+                *x += self.filter.offset(sample::unit(bits[k]));
             }
         }
         points

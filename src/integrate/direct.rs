@@ -42,7 +42,8 @@ pub struct Room {
     pub walk: Walk,
     /// Rays traced.
     pub rays: RayCounts,
-    /// Tiles that are done with.
+    /// Tiles that are done with; boxed, since they go from hand to hand and are large.
+    #[allow(clippy::vec_box)] // or each would be copied in and out
     pub(super) tiles: Vec<Box<Tile>>,
 }
 

@@ -71,7 +71,7 @@ impl Direct<'_> {
         for (p, packet) in tile.packets.iter_mut().enumerate() {
             *packet = shaded[p].as_ref().map_or(dead, |shaded| shaded.shadow_rays(light, Mask8::from_bits(lit[p])));
         }
-        let told = R::ON.then(|| tile.packets);
+        let told = R::ON.then_some(tile.packets);
         let redecided = sink.room.walk.counts.redecided;
         self.tree.occluded_tile(&mut tile, &mut sink.room.walk);
         let counts = &mut sink.room.rays;
