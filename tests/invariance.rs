@@ -195,3 +195,16 @@ fn a_cancelled_render_says_so_and_an_uncancelled_one_finishes() {
         }
     }
 }
+
+/// Between two mirrors a chain of rays ends at the depth limit alone: a thousand deep it needs no more stack.
+#[test]
+fn long_chains_of_rays_end_at_the_depth_limit() {
+    let text = "[image]\nwidth = 16\nheight = 16\nspp = 1\n[render]\nmax_depth = 1000\n\
+        [camera]\ntype = \"pinhole\"\neye = [0, 0, 0]\ntarget = [0, 0, 1]\nvfov = 1\n\
+        [materials.mirror]\ntype = \"mirror\"\nreflectance = [1, 1, 1]\n\
+        [[shapes]]\ntype = \"plane\"\npoint = [0, 0, 1]\nnormal = [0, 0, -1]\nmaterial = \"mirror\"\n\
+        [[shapes]]\ntype = \"plane\"\npoint = [0, 0, -1]\nnormal = [0, 0, 1]\nmaterial = \"mirror\"\n";
+    let scene = Scene::from_toml(text, std::path::Path::new(".")).unwrap_or_else(|errors| panic!("{errors}"));
+    let rendering = Renderer::new(&scene).expect("complete").render(&()).expect("a picture");
+    assert_eq!(rendering.stats.rays.rays, [256, 0, 256 * 999, 0]);
+}

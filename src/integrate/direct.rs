@@ -5,7 +5,7 @@
 
 use super::hits::Shaded;
 use super::record::{RayCounts, RayKind, Record};
-use super::wave::{Wave, lanes};
+use super::wave::{Branch, Wave, lanes};
 use crate::accel::{PACKETS, Tile, Tree, Walk};
 use crate::lanes::{Float8, LANES, Mask8, RayPacket, Vec3x8, float8};
 use crate::plan::Plan;
@@ -64,6 +64,13 @@ pub(super) struct Sink<'a, R: Record> {
     pub record: &'a mut R,
 }
 
+/// Up to 64 rays that are traced later.
+struct Later {
+    branches: Vec<Branch>,
+    kind: RayKind,
+    depth: u32,
+}
+
 impl<'s> Direct<'s> {
     /// Makes tables of the plan's materials and lights.
     pub fn new(plan: &'s Plan<'s>, tree: &'s Tree, max_depth: u32, skip: bool) -> Self {
@@ -85,14 +92,20 @@ impl<'s> Direct<'s> {
     }
 
     /// Radiance along camera rays, which where [`Direct::scatters`] keep what they were before they were
-    /// rounded.
+    /// rounded. What goes on from them waits on a list, not on the stack: chains may be long.
     pub fn radiance<R: Record>(&self, wave: Wave, room: &mut Room, record: &mut R) -> Samples {
         let mut samples = Samples { radiance: [Vec3x8::ZERO; PACKETS], alpha: [Float8::ZERO; PACKETS] };
-        self.trace(wave, &mut Sink { samples: &mut samples, room, record });
+        let mut sink = Sink { samples: &mut samples, room, record };
+        let mut waiting = Vec::new();
+        self.trace(wave, &mut sink, &mut waiting);
+        while let Some(Later { branches, kind, depth }) = waiting.pop() {
+            let tile = sink.room.tile(None);
+            self.trace(Wave::of_branches(tile, &branches, kind, depth), &mut sink, &mut waiting);
+        }
         samples
     }
 
-    fn trace<R: Record>(&self, mut wave: Wave, sink: &mut Sink<R>) {
+    fn trace<R: Record>(&self, mut wave: Wave, sink: &mut Sink<R>, waiting: &mut Vec<Later>) {
         let live = wave.tile.packets.map(|rays| rays.live().bits());
         let redecided = sink.room.walk.counts.redecided;
         self.tree.closest_tile(&mut wave.tile, &mut sink.room.walk);
@@ -116,10 +129,10 @@ impl<'s> Direct<'s> {
         }
         if wave.depth < self.max_depth && self.plan.scatters {
             let (reflected, refracted) = self.branches(&wave, &shaded);
-            for (kind, branches) in [(RayKind::Reflection, reflected), (RayKind::Refraction, refracted)] {
-                for chunk in branches.chunks(PACKETS * LANES) {
-                    let tile = sink.room.tile(None);
-                    self.trace(Wave::of_branches(tile, chunk, kind, wave.depth + 1), sink);
+            // The last one in is the first one out.
+            for (kind, branches) in [(RayKind::Refraction, refracted), (RayKind::Reflection, reflected)] {
+                if !branches.is_empty() {
+                    waiting.push(Later { branches, kind, depth: wave.depth + 1 });
                 }
             }
         }
