@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::accel::{PACKETS, Tile, Tree, Walk};
 use crate::lanes::{Float8, LANES, Ray, RayPacket, UNIT_ROUNDOFF};
-use crate::plan::Plan;
+use crate::plan::{InvalidScene, Plan, validate};
 use crate::scene::Scene;
 use crate::shade::attributes;
 use crate::shapes::RowRef;
@@ -19,9 +19,10 @@ use crate::shapes::RowRef;
 /// let shape = Shape::Sphere(Sphere { center: [0.0, 0.0, -5.0].into(), radius: 1.0 });
 /// scene.objects.push(Object { shape, material: 0, name: None, group: None });
 ///
-/// let tracer = Tracer::new(&scene);
+/// let tracer = Tracer::new(&scene)?;
 /// let hit = tracer.closest_hit(&Ray::new([0.0; 3], [0.0, 0.0, -1.0])).unwrap();
 /// assert_eq!((hit.t, hit.primitive, hit.front), (4.0, 0, true));
+/// # Ok::<(), octray::plan::InvalidScene>(())
 /// ```
 #[derive(Debug)]
 pub struct Tracer<'s> {
@@ -69,16 +70,23 @@ impl Hit {
 
 impl<'s> Tracer<'s> {
     /// Plans, stores and builds; rays are in the coordinates of the scene.
-    pub fn new(scene: &'s Scene) -> Self {
+    ///
+    /// # Errors
+    /// A scene that was made by hand and breaks a rule; one that was read does not.
+    pub fn new(scene: &'s Scene) -> Result<Self, InvalidScene> {
         Tracer::relative_to(scene, DVec3::ZERO)
     }
 
     /// The same for rays whose origins are given relative to `origin`, which keeps f32 exact near a place
     /// that is far from the scene's own origin.
-    pub fn relative_to(scene: &'s Scene, origin: DVec3) -> Self {
+    ///
+    /// # Errors
+    /// As [`Tracer::new`].
+    pub fn relative_to(scene: &'s Scene, origin: DVec3) -> Result<Self, InvalidScene> {
+        validate(scene)?;
         let plan = Plan::new(scene, origin);
         let tree = Tree::new(plan.parts(), &plan.visible);
-        Tracer { plan, tree }
+        Ok(Tracer { plan, tree })
     }
 
     /// The plan behind it.

@@ -338,7 +338,7 @@ fn every_primitive_has_the_uv_that_the_format_says() {
     ];
     for (shape, ray, want) in cases {
         let scene = scene_of([shape.clone()]);
-        let hit = Tracer::new(&scene).closest_hit(&ray).expect("aimed at it");
+        let hit = Tracer::new(&scene).expect("valid").closest_hit(&ray).expect("aimed at it");
         let got = DVec2::new(f64::from(hit.uv[0]), f64::from(hit.uv[1]));
         assert!((got - want).length() < 1e-6, "{shape:?}: got {got}, want {want}");
         assert!(checker_shows(scene, &ray, want), "{shape:?} {want}");

@@ -132,7 +132,7 @@ fn files_hold_what_the_library_answers_whatever_the_threads() {
     let room = Room::new();
     let (scene, rays) = (Scene::load(room.path("scene.toml")).unwrap(), fan());
     room.write("rays.npy", rays_file(&rays));
-    let tracer = Tracer::new(&scene);
+    let tracer = Tracer::new(&scene).expect("valid");
     let expected: Vec<_> = tracer.closest_hits(&rays).into_iter().map(|hit| hit.map_or(MISS, record)).collect();
     let met = expected.iter().filter(|hit| hit.primitive >= 0).count();
     assert!(met > 300 && rays.len() - met > 300, "{met}");

@@ -23,7 +23,7 @@ fn spawned(mut leave: impl FnMut(&str, &Shape, &Tracer, &Hit, Ray)) {
             for _ in 0..10 {
                 let shape = maker(center, scale, turn(&mut dice));
                 let scene = scene_of([shape.clone()]);
-                let tracer = Tracer::new(&scene);
+                let tracer = Tracer::new(&scene).expect("valid");
                 for _ in 0..150 {
                     let origin = center + dice.in_cube(3.0 * scale);
                     let aim = center + dice.in_cube(scale);
@@ -174,7 +174,7 @@ fn no_ray_leaks_through_a_seam() {
         for make in meshes {
             let mesh = make().moved(by);
             let scene = scene_of(mesh.shapes());
-            let (tracer, mut dice) = (Tracer::new(&scene), Dice(41));
+            let (tracer, mut dice) = (Tracer::new(&scene).expect("valid"), Dice(41));
             let mut rays = Vec::new();
             for case in 0..6000 {
                 let origin = (by + if case % 3 == 0 { DVec3::ZERO } else { dice.in_cube(0.3) }).as_vec3().as_dvec3();

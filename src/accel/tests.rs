@@ -170,7 +170,7 @@ fn of_coincident_primitives_the_first_one_wins_everywhere() {
     let rays = bundles(90, &mut dice);
     // A flat one seen edge-on may have its rounded `t` so far before its own box that the next copy's box is
     // left out: which copy wins is open there.
-    let tracer = crate::Tracer::new(&scene);
+    let tracer = crate::Tracer::new(&scene).expect("valid");
     let edge_on = |ray: &Ray| {
         let cos = |hit: crate::Hit| {
             let (normal, dir) = (DVec3::from_array(hit.normal.map(f64::from)), exact(ray).dir);
@@ -204,7 +204,7 @@ fn coincident_faces_of_different_kinds_go_to_the_lowest_index() {
         shapes.rotate_left(1);
         let scene = scene_of(shapes.clone());
         compare(&scene, &rays);
-        let tracer = crate::Tracer::new(&scene);
+        let tracer = crate::Tracer::new(&scene).expect("valid");
         for (ray, hit) in rays.iter().zip(tracer.closest_hits(&rays)) {
             let hit = hit.expect("the floor is everywhere");
             assert_eq!(hit.t, 4.0, "{ray:?}");
@@ -218,7 +218,7 @@ fn coincident_faces_of_different_kinds_go_to_the_lowest_index() {
 #[test]
 fn ten_thousand_times_the_same_sphere_is_a_scene() {
     let scene = scene_of(vec![sphere(DVec3::new(0.5, 0.0, -3.0), 1.0); 10_000]);
-    let tracer = crate::Tracer::new(&scene);
+    let tracer = crate::Tracer::new(&scene).expect("valid");
     let rays: Vec<Ray> = (0..64).map(|i| ray(DVec3::ZERO, DVec3::new(f64::from(i) / 64.0, 0.1, -1.0))).collect();
     let hits: Vec<_> = tracer.closest_hits(&rays).into_iter().flatten().collect();
     assert!(hits.len() > 20 && hits.iter().all(|hit| hit.primitive == 0), "{hits:?}");
@@ -230,7 +230,7 @@ fn ten_thousand_times_the_same_sphere_is_a_scene() {
 fn broken_rays_meet_nothing_in_any_company() {
     let mut dice = Dice(3);
     let scene = scene_of(mixed(50, &mut dice).into_iter().chain([plane(-9.0 * DVec3::Y, DVec3::Y)]));
-    let tracer = crate::Tracer::new(&scene);
+    let tracer = crate::Tracer::new(&scene).expect("valid");
     let mut rays = bundles(12, &mut dice);
     let broken = |i: usize| i % 5 == 2;
     for (i, ray) in rays.iter_mut().enumerate().filter(|(i, _)| broken(*i)) {

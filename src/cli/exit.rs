@@ -73,7 +73,7 @@ impl From<CompareError> for Failure {
 impl From<RenderError> for Failure {
     fn from(error: RenderError) -> Self {
         let exit = match error {
-            RenderError::NoCamera | RenderError::NoImage => Exit::Input,
+            RenderError::NoCamera | RenderError::NoImage | RenderError::Scene(_) => Exit::Input,
             RenderError::UnknownCamera { .. } | RenderError::BadWindow { .. } => Exit::Usage,
             RenderError::Threads(_) | RenderError::Cancelled => Exit::Limit,
         };

@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use glam::DVec3;
+use octray::plan::InvalidScene;
 use octray::plan::Kind;
+use octray::render::RenderError;
 use octray::scene::{
     Backdrop, Falloff, Filter, FilterKind, Integrator, Lens, Light, Material, Model, SCHEMA, Scene, Source, Texture,
     TextureKind, Visible,
@@ -47,7 +49,7 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
     };
     let loaded = scene_file::load(path, run)?;
     scene_file::need_memory(&loaded.scene, 0, "the tree of this scene")?;
-    let info = info(path, &loaded.scene, loaded.seconds);
+    let info = info(path, &loaded.scene, loaded.seconds).map_err(RenderError::from)?;
     if args.json {
         run.console.print_json(&info)?
     } else {
@@ -56,13 +58,13 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-fn info(path: &Path, scene: &Scene, load_seconds: f64) -> Value {
+fn info(path: &Path, scene: &Scene, load_seconds: f64) -> Result<Value, InvalidScene> {
     let building = Instant::now();
     let eye = scene.cameras.first().map_or(DVec3::ZERO, |camera| camera.eye);
-    let tracer = Tracer::relative_to(scene, eye);
+    let tracer = Tracer::relative_to(scene, eye)?;
     let build_seconds = building.elapsed().as_secs_f64();
     let list = |items: Vec<Value>| Value::Array(items);
-    json!({
+    Ok(json!({
         "schema": 1,
         "octray": env!("CARGO_PKG_VERSION"),
         "scene": path.display().to_string(),
@@ -85,7 +87,7 @@ fn info(path: &Path, scene: &Scene, load_seconds: f64) -> Value {
             "column_bytes": tracer.tree().stores().column_bytes(),
             "tree_bytes": tracer.tree().bytes(),
         },
-    })
+    }))
 }
 
 /// How many there are, in all and of each kind that there is.

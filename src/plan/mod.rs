@@ -3,8 +3,11 @@
 
 mod parts;
 mod split;
+mod valid;
 
 use glam::DVec3;
+
+pub use self::valid::{InvalidScene, validate};
 
 pub use self::parts::{
     BoxPart, ConePart, CylinderPart, DiskPart, Kind, Owner, Parts, PlanePart, PolygonPart, SpherePart, TurnedBoxPart,

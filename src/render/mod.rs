@@ -5,6 +5,7 @@ mod query;
 mod reference;
 mod stats;
 
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Instant;
 
@@ -19,7 +20,8 @@ use self::block::{Block, BlockWork};
 use crate::accel::Tree;
 use crate::film::{Picture, Window};
 use crate::integrate::{CameraRays, Direct, RayCounts, Record, Silent};
-use crate::plan::Plan;
+use crate::output::{self, Description, Losses, Options, OutputError};
+use crate::plan::{InvalidScene, Plan, validate};
 use crate::scene::{Camera, ImageSettings, Scene};
 
 /// Which tracer finds the hits.
@@ -76,6 +78,9 @@ pub enum RenderError {
         /// Of the display window.
         height: u32,
     },
+    /// The scene was made by hand and breaks a rule.
+    #[error(transparent)]
+    Scene(#[from] InvalidScene),
     /// The threads could not be started.
     #[error("cannot start threads: {0}")]
     Threads(String),
@@ -91,6 +96,7 @@ pub enum RenderError {
 /// let scene = Scene::load("scenes/fig5.toml")?;
 /// let rendering = Renderer::new(&scene)?.spp(64).render(&())?;
 /// println!("{} camera rays", rendering.stats.rays.rays[0]);
+/// rendering.write("fig5.exr")?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone)]
@@ -115,9 +121,23 @@ pub struct Rendering {
     pub stats: Stats,
 }
 
+impl Rendering {
+    /// Writes the picture, EXR (half) or PNG (8 bits) by the extension of `path`, aside and then renamed.
+    ///
+    /// # Errors
+    /// An unknown extension, or a file that cannot be written.
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<Losses, OutputError> {
+        output::write(path.as_ref(), &self.picture, Options::default(), &Description::default())
+    }
+}
+
 impl<'s> Renderer<'s> {
     /// The scene's own settings and first camera.
+    ///
+    /// # Errors
+    /// No camera or image size; a scene that was made by hand and breaks a rule.
     pub fn new(scene: &'s Scene) -> Result<Self, RenderError> {
+        validate(scene)?;
         Ok(Renderer {
             scene,
             camera: scene.camera(None).ok_or(RenderError::NoCamera)?,

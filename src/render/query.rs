@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::{Engine, RenderError, pool};
 use crate::lanes::{Ray, UNIT_ROUNDOFF};
+use crate::plan::validate;
 use crate::reference::{self, Reference};
 use crate::scene::Scene;
 use crate::tracer::{Hit, Tracer};
@@ -33,14 +34,15 @@ impl<'s> Query<'s> {
     /// Builds what the engine needs; 0 threads are as many as there are cores for this process.
     ///
     /// # Errors
-    /// [`RenderError::Threads`].
+    /// [`RenderError::Threads`], [`RenderError::Scene`].
     pub fn new(scene: &'s Scene, engine: Engine, threads: usize) -> Result<Self, RenderError> {
         let pool = pool(threads)?;
         let asked = pool.install(|| match engine {
-            Engine::Packet => Asked::Packet(Tracer::new(scene)),
-            Engine::Single => Asked::Single(Tracer::new(scene)),
-            Engine::Reference => Asked::Reference(Box::new(Reference::new(scene))),
+            Engine::Packet => Tracer::new(scene).map(Asked::Packet),
+            Engine::Single => Tracer::new(scene).map(Asked::Single),
+            Engine::Reference => validate(scene).map(|()| Asked::Reference(Box::new(Reference::new(scene)))),
         });
+        let asked = asked?;
         Ok(Query { asked, pool })
     }
 
