@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-use crate::accel::{PACKETS, Tile, Tree, Walk};
-use crate::lanes::{Float8, LANES, Ray, RayPacket, UNIT_ROUNDOFF};
+use crate::accel::{Counts, PACKETS, Tile, Tree, Walk};
+use crate::lanes::{Float8, LANES, Ray, RayPacket, UNIT_ROUNDOFF, Vec3x8};
 use crate::plan::{InvalidScene, Plan, validate};
 use crate::scene::Scene;
 use crate::shade::attributes;
@@ -89,6 +89,11 @@ impl<'s> Tracer<'s> {
         Ok(Tracer { plan, tree })
     }
 
+    /// With `true`, rays go one by one: the same bits, more slowly.
+    pub fn one_by_one(self, one_by_one: bool) -> Self {
+        Tracer { tree: self.tree.one_by_one(one_by_one), ..self }
+    }
+
     /// The plan behind it.
     pub fn plan(&self) -> &Plan<'s> {
         &self.plan
@@ -102,39 +107,53 @@ impl<'s> Tracer<'s> {
     /// What one ray meets first.
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
         let (t, row) = self.tree.closest(ray, &mut Walk::default());
-        let rays = RayPacket::splat(ray);
-        self.hits(&rays, [t; LANES], [row; LANES])[0]
+        let found = self.found(&RayPacket::splat(ray), Float8::splat(t), Float8::splat(row.to_lane()));
+        self.eight_hits(&RayPacket::splat(ray), &found)[0]
     }
 
     /// What each ray meets first: the same bits as one by one, faster.
     pub fn closest_hits(&self, rays: &[Ray]) -> Vec<Option<Hit>> {
-        let mut walk = Walk::default();
-        let mut hits = Vec::with_capacity(rays.len());
-        for chunk in rays.chunks(PACKETS * LANES) {
-            let mut tile = tile(chunk);
-            self.tree.closest_tile(&mut tile, &mut walk);
-            for (packet, rows) in tile.packets.iter().zip(tile.hits) {
-                let rows = rows.to_array().map(RowRef::from_lane);
-                hits.extend(self.hits(packet, packet.t_max.to_array(), rows));
-            }
-            hits.truncate(hits.len() - (PACKETS * LANES - chunk.len()));
-        }
+        let batch = RayBatch::new(rays);
+        let mut found = vec![Found::default(); batch.tiles()];
+        self.find_closest(&batch, 0, &mut found);
+        let mut hits = (0..batch.tiles()).flat_map(|i| self.hits(&batch, i, &found[i])).collect::<Vec<_>>();
+        hits.truncate(rays.len());
         hits
     }
 
     /// Whether each ray meets anything, either side of it.
     pub fn occluded(&self, rays: &[Ray]) -> Vec<bool> {
-        let mut walk = Walk::default();
-        let mut dark = Vec::with_capacity(rays.len());
-        for chunk in rays.chunks(PACKETS * LANES) {
-            let mut tile = tile(chunk);
-            let before = tile.packets.map(|rays| rays.live().bits());
-            self.tree.occluded_tile(&mut tile, &mut walk);
-            let after = tile.packets.map(|rays| rays.live().bits());
-            let met = |i: usize| (before[i / LANES] & !after[i / LANES]) >> (i % LANES) & 1 == 1;
-            dark.extend((0..chunk.len()).map(met));
+        let batch = RayBatch::new(rays);
+        let mut dark = vec![0; batch.tiles()];
+        self.find_occluded(&batch, 0, &mut dark);
+        (0..rays.len()).map(|i| dark[i / TILE] >> (i % TILE) & 1 == 1).collect()
+    }
+
+    /// What the rays of some tiles of a batch meet first, from tile `first` on, and the tests that took.
+    pub fn find_closest(&self, batch: &RayBatch, first: usize, found: &mut [Found]) -> Counts {
+        let (mut walk, mut tile) = (Walk::default(), Tile::empty());
+        for (i, found) in found.iter_mut().enumerate() {
+            batch.unpack(first + i, &mut tile);
+            self.tree.closest_tile(&mut tile, &mut walk);
+            for (p, found) in found.packets.iter_mut().enumerate() {
+                let rays = &tile.packets[p];
+                *found = self.found(rays, rays.t_max, tile.hits[p]);
+            }
         }
-        dark
+        walk.counts
+    }
+
+    /// Which rays of some tiles of a batch meet anything, a bit each, from tile `first` on, and the tests that took.
+    pub fn find_occluded(&self, batch: &RayBatch, first: usize, dark: &mut [u64]) -> Counts {
+        let (mut walk, mut tile) = (Walk::default(), Tile::empty());
+        let live = |tile: &Tile| (0..PACKETS).map(|p| u64::from(tile.packets[p].live().bits()) << (p * LANES)).sum();
+        for (i, dark) in dark.iter_mut().enumerate() {
+            batch.unpack(first + i, &mut tile);
+            let before: u64 = live(&tile);
+            self.tree.occluded_tile(&mut tile, &mut walk);
+            *dark = before & !live(&tile);
+        }
+        walk.counts
     }
 
     /// Whether one ray meets anything.
@@ -142,23 +161,113 @@ impl<'s> Tracer<'s> {
         self.tree.occluded(ray, &mut Walk::default())
     }
 
-    fn hits(&self, rays: &RayPacket, t: [f32; LANES], rows: [RowRef; LANES]) -> [Option<Hit>; LANES] {
+    #[inline(always)]
+    fn found(&self, rays: &RayPacket, t: Float8, rows: Float8) -> Found8 {
+        let (surface, owners) = self.tree.stores().surface::<true>(rows, rays, t);
+        Found8 { t, rows, normal: surface.normal, primitives: owners.map(|owner| owner.primitive) }
+    }
+
+    /// What the rays of one tile of a batch met, in full.
+    pub fn hits(&self, batch: &RayBatch, i: usize, found: &Found) -> Vec<Option<Hit>> {
+        let mut tile = Tile::empty();
+        batch.unpack(i, &mut tile);
+        let packets = tile.packets.iter().zip(&found.packets);
+        packets.flat_map(|(rays, found)| self.eight_hits(rays, found)).collect()
+    }
+
+    fn eight_hits(&self, rays: &RayPacket, found: &Found8) -> [Option<Hit>; LANES] {
+        let Found8 { t, rows, normal, primitives } = *found;
         let stores = self.tree.stores();
-        let lanes = Float8::from(rows.map(RowRef::to_lane));
-        let surface = stores.surface(lanes, rays, Float8::from(t));
-        let (points, normals) = (surface.point.to_arrays(), surface.normal.to_arrays());
-        let (dirs, errors) = (rays.dir.to_arrays(), surface.error.to_array());
+        let (surface, owners) = stores.surface::<false>(rows, rays, t);
+        let (points, normals) = (surface.point.to_arrays(), normal.to_arrays());
+        let (dirs, errors, t) = (rays.dir.to_arrays(), surface.error.to_array(), t.to_array());
         std::array::from_fn(|i| {
-            let kind = rows[i].kind()?;
-            let owner = stores.owner(kind, rows[i].row());
-            let (point, normal) = (points[i], normals[i]);
+            let row = RowRef::from_lane(rows.as_array()[i]);
+            row.kind()?;
+            let (owner, point, normal) = (owners[i], points[i], normals[i]);
             let front = normal[0] * dirs[i][0] + normal[1] * dirs[i][1] + normal[2] * dirs[i][2] < 0.0;
             let material = self.plan.side_material(owner.material, front);
-            let uv = attributes::uv(&self.plan, stores, rows[i], owner, DVec3::from_array(point.map(f64::from)));
+            let uv = attributes::uv(&self.plan, stores, row, owner, DVec3::from_array(point.map(f64::from)));
             let error = errors[i] + 2.0 * UNIT_ROUNDOFF * point.iter().map(|x| x.abs()).sum::<f32>();
             let uv = uv.as_vec2().to_array();
-            Some(Hit { t: t[i], primitive: owner.primitive, material, normal, uv, front, point, error })
+            Some(Hit { t: t[i], primitive: primitives[i], material, normal, uv, front, point, error })
         })
+    }
+}
+
+/// Rays of a tile.
+pub const TILE: usize = PACKETS * LANES;
+
+/// What 64 rays met, in columns.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Found {
+    packets: [Found8; PACKETS],
+}
+
+/// What eight rays met: place, row, unit normal (outward) and whose it is.
+#[derive(Debug, Clone, Copy)]
+struct Found8 {
+    t: Float8,
+    rows: Float8,
+    normal: Vec3x8,
+    primitives: [u32; LANES],
+}
+
+impl Default for Found8 {
+    fn default() -> Self {
+        let rows = Float8::splat(RowRef::MISS.to_lane());
+        Found8 { t: Float8::ZERO, rows, normal: Vec3x8::ZERO, primitives: [0; LANES] }
+    }
+}
+
+/// Rays in columns, 64 a tile, ready to be traced again and again.
+#[derive(Debug)]
+pub struct RayBatch {
+    tiles: Vec<Columns64>,
+    /// By tile; none where the rays of each tile share their origin.
+    origins: Vec<[Vec3x8; PACKETS]>,
+}
+
+/// The rays of a tile but for their origins.
+#[derive(Debug)]
+struct Columns64 {
+    dirs: [Vec3x8; PACKETS],
+    t_min: [Float8; PACKETS],
+    t_max: [Float8; PACKETS],
+    common: Option<[f32; 3]>,
+}
+
+impl RayBatch {
+    /// Turns rays into columns; those that cannot hit anything are dead.
+    pub fn new(rays: &[Ray]) -> Self {
+        let (mut tiles, mut origins) = (Vec::new(), Vec::new());
+        for Tile { packets, common, .. } in rays.chunks(TILE).map(tile) {
+            let (dirs, t_min) = (packets.map(|rays| rays.dir), packets.map(|rays| rays.t_min));
+            tiles.push(Columns64 { dirs, t_min, t_max: packets.map(|rays| rays.t_max), common });
+            origins.push(packets.map(|rays| rays.origin));
+        }
+        if tiles.iter().all(|tile| tile.common.is_some()) {
+            origins = Vec::new();
+        }
+        RayBatch { tiles, origins }
+    }
+
+    /// Tiles of 64 rays, the last of them perhaps of fewer.
+    pub fn tiles(&self) -> usize {
+        self.tiles.len()
+    }
+
+    #[inline(always)]
+    fn unpack(&self, i: usize, tile: &mut Tile) {
+        let Columns64 { dirs, t_min, t_max, common } = &self.tiles[i];
+        tile.renew(*common);
+        for p in 0..PACKETS {
+            let origin = match common {
+                Some(origin) => Vec3x8::splat(*origin),
+                None => self.origins[i][p],
+            };
+            tile.packets[p] = RayPacket::within(origin, dirs[p], t_min[p], t_max[p]);
+        }
     }
 }
 

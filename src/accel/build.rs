@@ -9,11 +9,11 @@ use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
 use super::Tree;
-use super::node::{Child, Node};
+use super::node::{Child, Leaf, Node};
 use crate::lanes::LANES;
 use crate::plan::{Kind, Parts};
 use crate::scene::Visible;
-use crate::shapes::{Boxes, Cones, Cylinders, Disks, Polygons, Spheres, Store, Stores, TurnedBoxes};
+use crate::shapes::{Groups, Part, Stores};
 
 /// Most rows of a leaf.
 const MOST_ROWS: u32 = 8;
@@ -38,39 +38,43 @@ impl Tree {
     pub fn new(mut parts: Parts, visible: &[Visible]) -> Self {
         let items = items(&parts);
         let mut nodes = Vec::new();
-        let mut size = 0.0;
+        let planes = parts.planes.len();
+        let (mut size, mut depth, mut groups) = (0.0, 0, None);
         if !items.is_empty() {
             let binary = build_binary(&items);
             let bounds = binary.nodes[0].aabb();
             size = (bounds.max - bounds.min).max_element();
             let mut wide = Widen::new(&binary, &items);
             wide.build();
-            nodes = wide.nodes;
+            (nodes, depth) = (wide.nodes, wide.depth);
             parts = reorder(parts, &wide.order);
+            groups = Some(wide.groups);
         }
-        let stores = Stores::new(parts, visible);
+        let stores = Stores::new(parts, groups.as_ref(), visible);
+        let plane = |block| Leaf { kind: Kind::Plane, block, count: LANES.min(planes - block * LANES) };
+        let planes = (0..stores.blocks(Kind::Plane)).map(plane).collect();
         let culls = stores.hide_any();
-        Tree { stores, nodes, culls, size, one_by_one: false }
+        Tree { stores, nodes, room: LANES * depth, planes, culls, size, one_by_one: false }
     }
 }
 
 fn items(parts: &Parts) -> Vec<Item> {
     let mut items = Vec::new();
-    add::<Spheres>(&mut items, Kind::Sphere, &parts.spheres);
-    add::<Disks>(&mut items, Kind::Disk, &parts.disks);
-    add::<Polygons<3>>(&mut items, Kind::Triangle, &parts.triangles);
-    add::<Polygons<4>>(&mut items, Kind::Quad, &parts.quads);
-    add::<Polygons<8>>(&mut items, Kind::Octagon, &parts.octagons);
-    add::<Boxes>(&mut items, Kind::Box, &parts.boxes);
-    add::<TurnedBoxes>(&mut items, Kind::TurnedBox, &parts.turned_boxes);
-    add::<Cylinders>(&mut items, Kind::Cylinder, &parts.cylinders);
-    add::<Cones>(&mut items, Kind::Cone, &parts.cones);
+    add(&mut items, Kind::Sphere, &parts.spheres);
+    add(&mut items, Kind::Disk, &parts.disks);
+    add(&mut items, Kind::Triangle, &parts.triangles);
+    add(&mut items, Kind::Quad, &parts.quads);
+    add(&mut items, Kind::Octagon, &parts.octagons);
+    add(&mut items, Kind::Box, &parts.boxes);
+    add(&mut items, Kind::TurnedBox, &parts.turned_boxes);
+    add(&mut items, Kind::Cylinder, &parts.cylinders);
+    add(&mut items, Kind::Cone, &parts.cones);
     items
 }
 
-fn add<S: Store>(items: &mut Vec<Item>, kind: Kind, parts: &[S::Part]) {
-    let item = |(index, part)| {
-        let (min, max) = S::bounds(part);
+fn add<P: Part>(items: &mut Vec<Item>, kind: Kind, parts: &[P]) {
+    let item = |(index, part): (usize, &P)| {
+        let (min, max) = part.bounds();
         Item { kind, index: index as u32, aabb: outward(min, max) }
     };
     items.extend(parts.iter().enumerate().map(item));
@@ -105,27 +109,39 @@ struct Widen<'a> {
     nodes: Vec<Node>,
     /// By kind: parts in the order of their rows.
     order: Vec<Vec<u32>>,
+    groups: Groups,
+    /// Levels of nodes.
+    depth: usize,
 }
 
 impl<'a> Widen<'a> {
     fn new(binary: &'a Bvh2, items: &'a [Item]) -> Self {
         let leaf = choose_leaves(binary, items);
-        Widen { binary, items, leaf, nodes: Vec::new(), order: vec![Vec::new(); Kind::ALL.len()] }
+        Widen {
+            binary,
+            items,
+            leaf,
+            nodes: Vec::new(),
+            order: vec![Vec::new(); Kind::ALL.len()],
+            groups: Groups::default(),
+            depth: 0,
+        }
     }
 
     /// Fills the nodes level by level from the root.
     fn build(&mut self) {
         self.nodes.push(Node::empty());
-        let mut waiting = vec![(0, 0)];
-        while let Some((wide, binary)) = waiting.pop() {
+        let mut waiting = vec![(0, 0, 1)];
+        while let Some((wide, binary, depth)) = waiting.pop() {
+            self.depth = self.depth.max(depth);
             for (slot, child) in self.eight_below(binary).into_iter().enumerate() {
                 let aabb = *self.binary.nodes[child as usize].aabb();
                 let content = if self.leaf[child as usize] > 0 {
                     self.add_leaf(child)
                 } else {
                     self.nodes.push(Node::empty());
-                    waiting.push((self.nodes.len() - 1, child));
-                    Child::Node(self.nodes.len() - 1)
+                    waiting.push((self.nodes.len() - 1, child, depth + 1));
+                    Child::node(self.nodes.len() - 1)
                 };
                 self.nodes[wide].set(slot, aabb.min.into(), aabb.max.into(), content);
             }
@@ -159,11 +175,11 @@ impl<'a> Widen<'a> {
                 }
             }
         }
-        let kind = rows[0].kind;
-        let order = &mut self.order[kind as usize];
-        let first = order.len();
-        order.extend(rows.iter().map(|item| item.index));
-        Child::Leaf { kind, first, count: rows.len() }
+        let (kind, count) = (rows[0].kind, rows.len());
+        self.order[kind as usize].extend(rows.iter().map(|item| item.index));
+        let groups = &mut self.groups[kind as usize];
+        groups.push(count as u8);
+        Child::leaf(Leaf { kind, block: groups.len() - 1, count })
     }
 }
 

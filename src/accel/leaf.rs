@@ -1,16 +1,15 @@
-//! Rows against rays: the loops behind the one match on the kind.
+//! Leaves: eight rays against one primitive, or one ray against eight.
 
+use super::node::Leaf;
 use crate::accel::Counts;
-use crate::lanes::{Float8, Hit8, LANES, Mask8, RayPacket, Vec3x8, float8};
-use crate::plan::Kind;
+use crate::lanes::{Float8, Hit8, LANES, Mask8, RayPacket, Vec3x8, bits, float8};
 use crate::scene::Visible;
-use crate::shapes::{Ray64, RowRef, Store, Stores, Visit};
+use crate::shapes::{Hidden8, Part, Ray64, RowRef, Store, Stores, Visit};
 
-/// Some rows of a kind against some packets, a lane a ray.
+/// Some packets of a tile in a leaf: a lane is a ray.
 pub struct PacketLeaf<'a, const ANY: bool, const CULL: bool> {
     pub stores: &'a Stores,
-    pub kind: Kind,
-    pub rows: std::ops::Range<usize>,
+    pub leaf: Leaf,
     pub packets: &'a mut [RayPacket],
     pub hits: &'a mut [Float8],
     /// Packets that take part, a bit each.
@@ -24,38 +23,34 @@ impl<const ANY: bool, const CULL: bool> Visit for PacketLeaf<'_, ANY, CULL> {
     /// The packets in which something was met.
     type Output = u32;
 
-    #[inline(always)]
-    fn visit<S: Store>(mut self, store: &S) -> u32 {
-        self.counts.kinds[self.kind as usize] +=
-            (self.rows.len() as u32 * self.mask.count_ones()) as u64 * LANES as u64;
+    #[inline(never)]
+    fn visit<P: Part>(mut self, store: &Store<P>) -> u32 {
+        let Leaf { kind, count, .. } = self.leaf;
+        self.counts.kinds[kind as usize] += (count as u32 * self.mask.count_ones()) as u64 * LANES as u64;
         match self.common {
-            Some(origin) => self.loop_rows(store, |row, _| S::anchor(row, &origin), true),
-            None => self.loop_rows(store, |row, rays: &RayPacket| S::anchor(row, &rays.origin), false),
+            Some(origin) => self.each_row(store, Some(&origin)),
+            None => self.each_row(store, None),
         }
     }
 }
 
 impl<const ANY: bool, const CULL: bool> PacketLeaf<'_, ANY, CULL> {
     #[inline(always)]
-    fn loop_rows<S: Store>(
-        &mut self,
-        store: &S,
-        anchor: impl Fn(&S::Row, &RayPacket) -> S::Anchor,
-        shared: bool,
-    ) -> u32 {
+    fn each_row<P: Part>(&mut self, store: &Store<P>, common: Option<&Vec3x8>) -> u32 {
+        let Leaf { kind, block, count } = self.leaf;
         let mut touched = 0;
-        for i in self.rows.clone() {
-            let row = store.splat(i);
-            let once = shared.then(|| anchor(&row, &self.packets[0]));
-            let mut live = self.mask;
-            while live != 0 {
-                let p = live.trailing_zeros() as usize;
-                live &= live - 1;
+        for lane in 0..count {
+            let row = block * LANES + lane;
+            let rows = store.splat(row);
+            let part = |_| store.part(row);
+            let hidden = if CULL { store.sides().lanes(|_| row) } else { Hidden8::NONE };
+            let once = common.map(|origin| P::anchor(&rows, origin, part));
+            for p in bits(self.mask) {
                 let rays = &mut self.packets[p];
-                let anchor = once.unwrap_or_else(|| anchor(&row, rays));
-                let mut hit = S::hit::<CULL>(&anchor, rays);
+                let anchor = once.unwrap_or_else(|| P::anchor(&rows, &rays.origin, part));
+                let mut hit = P::hit::<CULL>(&anchor, rays, &hidden);
                 if hit.doubt.any() {
-                    decide::<S, CULL>(store, |_| i, rays, &mut hit, self.counts);
+                    decide::<P, CULL>(store, |_| row, rays, &mut hit, self.counts);
                 }
                 if !hit.mask.any() {
                     continue;
@@ -66,7 +61,7 @@ impl<const ANY: bool, const CULL: bool> PacketLeaf<'_, ANY, CULL> {
                     rays.t_min = hit.mask.select(float8(f32::INFINITY), rays.t_min);
                     continue;
                 }
-                let row = RowRef::new(self.kind, i);
+                let row = RowRef::new(kind, row);
                 let ties = hit.mask & Mask8::ge(hit.t, rays.t_max);
                 if ties.any() {
                     hit.mask &= !settle_ties(self.stores, row, &self.hits[p], ties);
@@ -79,11 +74,10 @@ impl<const ANY: bool, const CULL: bool> PacketLeaf<'_, ANY, CULL> {
     }
 }
 
-/// Some rows of a kind against one ray, a lane a row.
+/// One ray in a leaf: a lane is a primitive.
 pub struct RayLeaf<'a, const ANY: bool, const CULL: bool> {
     pub stores: &'a Stores,
-    pub kind: Kind,
-    pub rows: std::ops::Range<usize>,
+    pub leaf: Leaf,
     /// The ray in all lanes; its `t_max` is the place of the best hit.
     pub ray: &'a mut RayPacket,
     pub hit: &'a mut RowRef,
@@ -93,77 +87,65 @@ pub struct RayLeaf<'a, const ANY: bool, const CULL: bool> {
 impl<const ANY: bool, const CULL: bool> Visit for RayLeaf<'_, ANY, CULL> {
     type Output = ();
 
-    #[inline(always)]
-    fn visit<S: Store>(self, store: &S) {
-        for first in self.rows.clone().step_by(LANES) {
-            self.counts.kinds[self.kind as usize] += LANES as u64;
-            let row = store.block(first);
-            let mut hit = S::hit::<CULL>(&S::anchor(&row, &self.ray.origin), self.ray);
-            if hit.doubt.any() {
-                decide::<S, CULL>(store, |lane| first + lane, self.ray, &mut hit, self.counts);
-            }
-            let mut lanes = hit.mask.bits();
-            if lanes == 0 {
-                continue;
-            }
-            let (t, mut best) = (hit.t.to_array(), self.ray.t_max.to_array()[0]);
-            while lanes != 0 {
-                let lane = lanes.trailing_zeros() as usize;
-                lanes &= lanes - 1;
-                let row = RowRef::new(self.kind, first + lane);
-                if t[lane] < best {
-                    (best, *self.hit) = (t[lane], row);
-                } else if t[lane] == best {
-                    *self.hit = self.stores.first_of(*self.hit, row);
-                }
-            }
-            self.ray.t_max = float8(best);
-            if ANY {
-                return;
+    #[inline(never)]
+    fn visit<P: Part>(self, store: &Store<P>) {
+        let Leaf { kind, block, .. } = self.leaf;
+        self.counts.kinds[kind as usize] += LANES as u64;
+        let row = |lane: usize| block * LANES + lane;
+        let anchor = P::anchor(store.block(block), &self.ray.origin, |lane| store.part(row(lane)));
+        let hidden = if CULL { store.sides().lanes(row) } else { Hidden8::NONE };
+        let mut hit = P::hit::<CULL>(&anchor, self.ray, &hidden);
+        if hit.doubt.any() {
+            decide::<P, CULL>(store, row, self.ray, &mut hit, self.counts);
+        }
+        let lanes = hit.mask.bits();
+        if lanes == 0 {
+            return;
+        }
+        let (t, mut best) = (hit.t.to_array(), self.ray.t_max.as_array()[0]);
+        for lane in bits(lanes) {
+            let row = RowRef::new(kind, row(lane));
+            if t[lane] < best {
+                (best, *self.hit) = (t[lane], row);
+            } else if t[lane] == best {
+                *self.hit = self.stores.first_of(*self.hit, row);
             }
         }
+        self.ray.t_max = float8(best);
     }
 }
 
-/// Decides doubtful lanes from the exact numbers of ray and part.
+/// Answers in f64 where the kernel was in doubt.
 #[cold]
 #[inline(never)]
-fn decide<S: Store, const CULL: bool>(
-    store: &S,
+fn decide<P: Part, const CULL: bool>(
+    store: &Store<P>,
     row: impl Fn(usize) -> usize,
     rays: &RayPacket,
     hit: &mut Hit8,
     counts: &mut Counts,
 ) {
     let (mut t, mut mask) = (hit.t.to_array(), hit.mask.bits());
-    let mut doubt = hit.doubt.bits();
-    while doubt != 0 {
-        let lane = doubt.trailing_zeros() as usize;
-        doubt &= doubt - 1;
-        let i = row(lane);
+    for lane in hit.doubt.lanes() {
         let has_place = mask >> lane & 1 == 1;
         mask &= !(1 << lane);
-        let Some(part) = store.parts().get(i) else { continue };
+        let Some(part) = store.part(row(lane)) else { continue };
         counts.redecided += 1;
-        let visible = if CULL { store.sides().row(i) } else { Visible::Both };
+        let visible = if CULL { store.sides().row(row(lane)) } else { Visible::Both };
         let exact = Ray64::exact(&rays.lane(lane));
         // Whether a place of the kernel's own lies on the ray is decided already.
         let ray = if has_place { exact.endless() } else { exact };
-        let met = S::decide(part, &ray, visible);
+        let met = part.decide(&ray, visible);
         mask |= u32::from(met.is_some()) << lane;
         t[lane] = met.filter(|_| !has_place).map_or(t[lane], |t| t as f32);
     }
     *hit = Hit8 { t: Float8::from(t), mask: Mask8::from_bits(mask), doubt: Mask8::NONE };
 }
 
-/// The lanes whose old hit, at the same `t`, wins.
+/// Lanes of `ties` in which the old hit wins over `row` at the same place.
 #[cold]
 #[inline(never)]
 fn settle_ties(stores: &Stores, row: RowRef, old: &Float8, ties: Mask8) -> Mask8 {
-    let old = old.to_array();
-    let keeps = |lane: &usize| {
-        let old = RowRef::from_lane(old[*lane]);
-        ties.bits() >> lane & 1 == 1 && stores.first_of(row, old) != row
-    };
-    Mask8::from_bits((0..LANES).filter(keeps).map(|lane| 1 << lane).sum())
+    let keeps = |lane: &usize| stores.first_of(row, RowRef::from_lane(old.as_array()[*lane])) != row;
+    Mask8::from_bits(ties.lanes().filter(keeps).map(|lane| 1 << lane).sum())
 }

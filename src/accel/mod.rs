@@ -5,17 +5,22 @@
 //! one by one, a lane a box, and in a leaf a lane is a primitive.
 
 mod build;
+mod bundle;
+mod descend;
 mod leaf;
 mod node;
 mod single;
+mod stack;
 #[cfg(test)]
 mod tests;
 mod tile;
 
 pub use self::tile::{PACKETS, Tile};
 
-use self::node::Node;
-use crate::lanes::Ray;
+use self::descend::Waiting;
+use self::node::{Beam, Child, Leaf, Node};
+use self::stack::Entry;
+use crate::lanes::{Ray, RayPacket};
 use crate::plan::Kind;
 use crate::shapes::{RowRef, Stores};
 
@@ -23,10 +28,12 @@ use crate::shapes::{RowRef, Stores};
 #[derive(Debug)]
 pub struct Tree {
     stores: Stores,
-    nodes: Vec<Node>, // the root first; empty where nothing has bounds
-    culls: bool,      // some row hides a side
-    size: f32,        // longest edge of the bounds, scene units
-    one_by_one: bool, // no tiles
+    nodes: Vec<Node>,  // the root first; empty where nothing has bounds
+    room: usize,       // the most that waits on the way down
+    planes: Vec<Leaf>, // planes, which have no bounds
+    culls: bool,       // some row hides a side
+    size: f32,         // longest edge of the bounds, scene units
+    one_by_one: bool,  // no tiles
 }
 
 /// Work done, and room for it: one a thread.
@@ -34,8 +41,9 @@ pub struct Tree {
 pub struct Walk {
     /// What was done so far.
     pub counts: Counts,
-    stack: Vec<tile::Entry>,
-    short: Vec<single::Entry>,
+    companies: Vec<Entry<Waiting>>,
+    singles: Vec<Entry<Child>>,
+    beams: Vec<Beam>,
 }
 
 /// Tests done, in pairs of a ray or packet and a box or primitive.
@@ -50,6 +58,12 @@ pub struct Counts {
 }
 
 impl Counts {
+    /// Both together.
+    pub fn sum(mut self, other: Counts) -> Self {
+        self.add(&other);
+        self
+    }
+
     /// Sums up.
     pub fn add(&mut self, other: &Counts) {
         self.boxes += other.boxes;
@@ -76,19 +90,31 @@ impl Tree {
         self.nodes.capacity() * size_of::<Node>()
     }
 
+    /// Makes room for what waits on the way down.
+    fn make_room(&self, walk: &mut Walk) {
+        if walk.singles.len() < self.room {
+            walk.singles.resize(self.room, Entry::default());
+            walk.companies.resize(2 * self.room, Entry::default());
+        }
+    }
+
     /// What one ray meets first, and where.
     pub fn closest(&self, ray: &Ray, walk: &mut Walk) -> (f32, RowRef) {
         if !ray.is_valid() {
             return (ray.t_max, RowRef::MISS);
         }
-        match self.culls {
-            true => self.walk_single::<false, true>(ray, walk),
-            false => self.walk_single::<false, false>(ray, walk),
-        }
+        self.make_room(walk);
+        let mut ray = RayPacket::splat(ray);
+        let row = match self.culls {
+            true => self.walk_single::<false, true>(&mut ray, walk),
+            false => self.walk_single::<false, false>(&mut ray, walk),
+        };
+        (ray.t_max.as_array()[0], row)
     }
 
     /// Whether one ray meets anything, either side of it.
     pub fn occluded(&self, ray: &Ray, walk: &mut Walk) -> bool {
-        ray.is_valid() && self.walk_single::<true, false>(ray, walk).1 != RowRef::MISS
+        self.make_room(walk);
+        ray.is_valid() && self.walk_single::<true, false>(&mut RayPacket::splat(ray), walk) != RowRef::MISS
     }
 }

@@ -2,93 +2,115 @@
 
 use glam::Vec3;
 
-use crate::lanes::{Float8, LANES, Mask8, Ray, UNIT_ROUNDOFF, float8};
+use crate::lanes::{Columns, Float8, LANES, Mask8, RayPacket, UNIT_ROUNDOFF, float8};
 use crate::plan::Kind;
 
 /// Eight boxes and what they hold. An empty slot has an inverted box, which nothing meets.
 #[derive(Debug, Clone)]
 #[repr(align(64))]
 pub struct Node {
-    /// Lower and upper bounds by axis, a lane a child.
-    pub bounds: [[Float8; 3]; 2],
-    /// First row of a leaf, or the index of a node.
-    first: [u32; LANES],
-    /// 0 for a node; kind and number of rows for a leaf.
-    leaf: [u8; LANES],
+    /// A lane a child: by axis lower and upper bounds, then what the slots hold, and how large.
+    columns: [Float8; 8],
 }
 
-/// What a slot holds.
+/// Column of the children.
+const CHILDREN: usize = 6;
+/// Column of the longest edges of their boxes.
+const SIZES: usize = 7;
+
+/// What a slot holds, in 32 bits.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Child(u32);
+
+/// The same spelled out.
 #[derive(Debug, Clone, Copy)]
-pub enum Child {
+pub enum Content {
     /// A node, by index.
     Node(usize),
-    /// Rows of one kind.
-    Leaf {
-        /// Their kind.
-        kind: Kind,
-        /// The first one.
-        first: usize,
-        /// How many, 1 to 8.
-        count: usize,
-    },
+    /// The first rows of a block.
+    Leaf(Leaf),
+}
+
+/// Parts of one kind.
+#[derive(Debug, Clone, Copy)]
+pub struct Leaf {
+    /// Their kind.
+    pub kind: Kind,
+    /// Their block in its store.
+    pub block: usize,
+    /// How many there are, 1 to 8.
+    pub count: usize,
+}
+
+impl Child {
+    const BLOCK_BITS: u32 = 25;
+    const KIND_BIT: u32 = 28;
+
+    /// A node, by index.
+    pub fn node(index: usize) -> Self {
+        Child(index as u32)
+    }
+
+    /// Parts of one kind.
+    pub fn leaf(leaf: Leaf) -> Self {
+        let kind = (leaf.kind as u32 + 1) << Child::KIND_BIT;
+        Child(kind | (leaf.count as u32 - 1) << Child::BLOCK_BITS | leaf.block as u32)
+    }
+
+    /// What it is.
+    #[inline(always)]
+    pub fn content(self) -> Content {
+        let Some(kind) = (self.0 >> Child::KIND_BIT).checked_sub(1) else { return Content::Node(self.0 as usize) };
+        Content::Leaf(Leaf {
+            kind: Kind::ALL[kind as usize % Kind::ALL.len()],
+            block: (self.0 & ((1 << Child::BLOCK_BITS) - 1)) as usize,
+            count: (self.0 >> Child::BLOCK_BITS & 7) as usize + 1,
+        })
+    }
 }
 
 impl Node {
     /// Eight empty slots.
     pub fn empty() -> Self {
-        let infinity = float8(f32::INFINITY);
-        Node { bounds: [[infinity; 3], [-infinity; 3]], first: [0; LANES], leaf: [0; LANES] }
+        let (low, high, zero) = (float8(f32::INFINITY), float8(f32::NEG_INFINITY), Float8::ZERO);
+        Node { columns: [low, high, low, high, low, high, zero, zero] }
     }
 
     /// Fills a slot; bounds must be those of f32 already.
     pub fn set(&mut self, slot: usize, min: Vec3, max: Vec3, child: Child) {
         for axis in 0..3 {
-            for (bound, value) in [(0, min[axis]), (1, max[axis])] {
-                let mut lanes = self.bounds[bound][axis].to_array();
-                lanes[slot] = value;
-                self.bounds[bound][axis] = Float8::from(lanes);
-            }
+            self.columns[2 * axis].as_mut_array()[slot] = min[axis];
+            self.columns[2 * axis + 1].as_mut_array()[slot] = max[axis];
         }
-        (self.first[slot], self.leaf[slot]) = match child {
-            Child::Node(index) => (index as u32, 0),
-            Child::Leaf { kind, first, count } => (first as u32, (kind as u8) << 4 | count as u8),
-        };
+        self.columns[CHILDREN].as_mut_array()[slot] = f32::from_bits(child.0);
+        self.columns[SIZES].as_mut_array()[slot] = (max - min).max_element();
     }
 
     /// What a slot holds.
     #[inline(always)]
     pub fn child(&self, slot: usize) -> Child {
-        let (first, leaf) = (self.first[slot] as usize, self.leaf[slot]);
-        match leaf & 15 {
-            0 => Child::Node(first),
-            count => Child::Leaf { kind: Kind::ALL[usize::from(leaf >> 4)], first, count: usize::from(count) },
-        }
+        Child(self.columns[CHILDREN].as_array()[slot % LANES].to_bits())
     }
 
-    /// The planes that a ray of these signs enters and leaves by, a lane a child.
+    /// The longest edge of the box of a slot, in all lanes.
     #[inline(always)]
-    pub fn planes(&self, back: [bool; 3]) -> Planes {
-        let side = |first: bool| std::array::from_fn(|axis| self.bounds[usize::from(back[axis] != first)][axis]);
-        Planes { near: side(false), far: side(true) }
+    pub fn size(&self, slot: usize) -> Float8 {
+        self.columns[SIZES].broadcast(slot)
     }
 
-    /// The same of one child, in all lanes.
+    /// The planes of all boxes that are entered and left by on an axis, a lane a child.
     #[inline(always)]
-    pub fn planes_of(&self, slot: usize, back: [bool; 3]) -> Planes {
-        let Planes { near, far } = self.planes(back);
-        let splat = |planes: [Float8; 3]| planes.map(|plane| float8(plane.as_array()[slot]));
-        Planes { near: splat(near), far: splat(far) }
+    fn planes(&self, near: usize) -> (&Float8, &Float8) {
+        (&self.columns[near % 8], &self.columns[(near ^ 1) % 8])
     }
 }
 
-/// Where boxes are entered and left, by axis.
-#[derive(Debug, Clone, Copy)]
-pub struct Planes {
-    near: [Float8; 3],
-    far: [Float8; 3],
+/// By axis the column of the planes that rays enter by which go down on the axes of `back`.
+pub fn near_planes(back: [bool; 3]) -> [usize; 3] {
+    [usize::from(back[0]), 2 + usize::from(back[1]), 4 + usize::from(back[2])]
 }
 
-/// Bounds of some rays that go the same way on every axis: for one ray they are the ray.
+/// Bounds of some rays: for one ray they are the ray.
 #[derive(Debug, Clone, Copy)]
 pub struct Beam {
     /// Origins furthest along the direction, which reach a plane first.
@@ -99,9 +121,12 @@ pub struct Beam {
     pub inv_near: [Float8; 3],
     /// Inverse directions of greatest magnitude.
     pub inv_far: [Float8; 3],
-    /// Axes on which the rays go down.
-    pub back: [bool; 3],
-    /// Open ends of the rays, the least.
+    /// By axis the column of the planes by which they enter.
+    pub near: [usize; 3],
+    /// Axes on which some rays go up and some go down: those that go up enter by the lower plane, and those that go
+    /// down, which the far values stand for, by the upper one.
+    pub split: [bool; 3],
+    /// Where the rays begin at the earliest, not before their origins.
     pub start: Float8,
 }
 
@@ -109,34 +134,114 @@ pub struct Beam {
 /// stays within it.
 pub const LEAST_DIRECTION: f32 = 1e-30;
 
+/// What inverses of far planes are longer by, so that no hit is lost to rounding (Ize, "Robust BVH ray traversal",
+/// Journal of Computer Graphics Techniques 2(2), 2013, needs 4 roundings).
+pub const OUTWARD: f32 = 1.0 + 8.0 * UNIT_ROUNDOFF;
+
 /// How far a hit may seem to lie before the box that it is in, as a share of its `t`: a flat primitive divides
 /// the roundings of its `t` by the cosine it is seen at, which this covers down to 0.003.
 const HIT_SLACK: f32 = 4096.0 * UNIT_ROUNDOFF;
 
+/// How far boxes are looked for where the best hits are at `t`: of hits at the same place all are to be found, so
+/// that the lowest primitive wins on every walk. Short of infinity, where empty slots are.
+#[inline(always)]
+pub fn reach(t: Float8) -> Float8 {
+    let most = float8(f32::MAX);
+    t.abs().fast_min(most).mul_add(float8(HIT_SLACK), t).fast_min(most)
+}
+
 impl Beam {
-    /// One ray in all lanes.
-    pub fn of_ray(ray: &Ray) -> Self {
-        let back = ray.dir.map(f32::is_sign_negative);
-        let inv = ray.dir.map(|d| float8(1.0 / d.abs().max(LEAST_DIRECTION).copysign(d)));
-        let origin = ray.origin.map(float8);
-        Beam { origin_near: origin, origin_far: origin, inv_near: inv, inv_far: inv, back, start: float8(ray.t_min) }
+    /// The bounds of one lane in all lanes.
+    #[inline(always)]
+    pub fn broadcast(&self, lane: usize) -> Self {
+        Beam {
+            origin_near: self.origin_near.broadcast(lane),
+            origin_far: self.origin_far.broadcast(lane),
+            inv_near: self.inv_near.broadcast(lane),
+            inv_far: self.inv_far.broadcast(lane),
+            ..*self
+        }
     }
 
-    /// Where the rays may enter the boxes at the earliest, and which boxes they may meet before `limit`.
-    ///
-    /// `(plane - origin) * inverse` with 8 roundings of slack loses no hit (Ize, "Robust BVH ray traversal",
-    /// Journal of Computer Graphics Techniques 2(2), 2013, needs 4). The comparison with the best hit has
-    /// [`HIT_SLACK`]: of hits at the same `t` all are found, so that the lowest primitive wins on every walk.
+    /// Where the rays may enter the boxes of a node at the earliest, and which boxes they may meet before `limit`.
     #[inline(always)]
-    pub fn meets(&self, planes: &Planes, limit: Float8) -> (Float8, Mask8) {
-        let (mut entry, mut exit) = (self.start, float8(f32::INFINITY));
+    pub fn meets_children(&self, node: &Node, limit: Float8) -> (Float8, Mask8) {
+        self.meets(|k| node.planes(self.near[k]), limit)
+    }
+
+    /// Where each of the rays may enter one box of a node at the earliest, and which may meet it before `limit`.
+    #[inline(always)]
+    pub fn meets_child(&self, node: &Node, slot: usize, limit: Float8) -> (Float8, Mask8) {
+        let of_child = |plane: &Float8| float8(plane.as_array()[slot % LANES]);
+        let planes = |k: usize| {
+            let (near, far) = node.planes(self.near[k]);
+            (of_child(near), of_child(far))
+        };
+        self.meets(planes, limit)
+    }
+
+    #[inline(always)]
+    fn meets<P: std::borrow::Borrow<Float8>>(
+        &self,
+        planes: impl Fn(usize) -> (P, P),
+        limit: Float8,
+    ) -> (Float8, Mask8) {
+        let (mut entry, mut exit) = (self.start, limit);
         for k in 0..3 {
-            entry = ((planes.near[k] - self.origin_near[k]) * self.inv_near[k]).fast_max(entry);
-            exit = ((planes.far[k] - self.origin_far[k]) * self.inv_far[k]).fast_min(exit);
+            let (near, far) = planes(k);
+            let near = (*near.borrow() - self.origin_near[k]) * self.inv_near[k];
+            let far = (*far.borrow() - self.origin_far[k]) * self.inv_far[k];
+            entry = near.fast_max(entry);
+            if self.split[k] {
+                entry = far.fast_max(entry);
+            } else {
+                exit = far.fast_min(exit);
+            }
         }
-        let size = entry.abs();
-        let tight = size.mul_neg_add(float8(8.0 * UNIT_ROUNDOFF), entry);
-        let early = size.mul_neg_add(float8(HIT_SLACK), entry);
-        (early, Mask8::le(tight, exit) & Mask8::le(early, limit))
+        (entry, Mask8::le(entry, exit))
+    }
+}
+
+/// One ray, in all lanes.
+#[derive(Debug, Clone, Copy)]
+pub struct Line {
+    origin: [Float8; 3],
+    inv: [Float8; 3],
+    near: [usize; 3],
+    start: Float8,
+    /// Whether it begins behind its origin.
+    behind: bool,
+}
+
+impl Line {
+    /// Takes the ray of all lanes.
+    #[inline(always)]
+    pub fn new(ray: &RayPacket) -> Self {
+        let dir = [ray.dir.x, ray.dir.y, ray.dir.z];
+        let inv = dir.map(|d| {
+            let magnitude = float8(1.0) / d.abs().fast_max(float8(LEAST_DIRECTION));
+            Mask8::sign(d).select(-magnitude, magnitude)
+        });
+        let back = dir.map(|d| d.as_array()[0].is_sign_negative());
+        let behind = ray.t_min.as_array()[0] < 0.0;
+        let origin = [ray.origin.x, ray.origin.y, ray.origin.z];
+        Line { origin, inv, near: near_planes(back), start: ray.t_min, behind }
+    }
+
+    /// Where the ray may enter the boxes of a node at the earliest, and which boxes it may meet before `limit`.
+    #[inline(always)]
+    pub fn meets(&self, node: &Node, limit: Float8) -> (Float8, Mask8) {
+        let at = |k: usize| {
+            let (near, far) = node.planes(self.near[k]);
+            ((*near - self.origin[k]) * self.inv[k], (*far - self.origin[k]) * self.inv[k])
+        };
+        let (x, y, z) = (at(0), at(1), at(2));
+        let entry = x.0.fast_max(y.0).fast_max(z.0.fast_max(self.start));
+        let exit = x.1.fast_min(y.1).fast_min(z.1);
+        let exit = match self.behind {
+            false => exit * float8(OUTWARD),
+            true => exit.abs().mul_add(float8(OUTWARD - 1.0), exit),
+        };
+        (entry, Mask8::le(entry, exit.fast_min(limit)))
     }
 }

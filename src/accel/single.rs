@@ -1,84 +1,76 @@
 //! One ray down the tree: a lane is a child, in leaves a primitive.
 
 use super::leaf::RayLeaf;
-use super::node::{Beam, Child};
+use super::node::{Child, Content, Leaf, Line, reach};
+use super::stack::Stack;
 use super::{Tree, Walk};
-use crate::lanes::{LANES, Ray, RayPacket, float8};
-use crate::plan::Kind;
+use crate::lanes::{LANES, RayPacket};
 use crate::shapes::RowRef;
 
-/// A child that may hold something nearer.
-#[derive(Debug, Clone, Copy)]
-pub struct Entry {
-    entry: f32,
-    child: Child,
-}
-
 impl Tree {
-    /// The closest hit of one valid ray, or with `ANY` the first one found.
-    pub(super) fn walk_single<const ANY: bool, const CULL: bool>(&self, ray: &Ray, walk: &mut Walk) -> (f32, RowRef) {
-        let mut rays = RayPacket::splat(ray);
+    /// Finds the closest hit of one valid ray, which is in all lanes, or with `ANY` the first one found; its `t_max`
+    /// is then the place of the hit.
+    pub(super) fn walk_single<const ANY: bool, const CULL: bool>(
+        &self,
+        ray: &mut RayPacket,
+        walk: &mut Walk,
+    ) -> RowRef {
         let mut hit = RowRef::MISS;
-        let planes = 0..self.stores.count(Kind::Plane);
-        self.ray_leaf::<ANY, CULL>(Kind::Plane, planes, &mut rays, &mut hit, walk);
+        for leaf in &self.planes {
+            self.ray_leaf::<ANY, CULL>(*leaf, ray, &mut hit, walk);
+        }
         if self.nodes.is_empty() || (ANY && hit != RowRef::MISS) {
-            return (rays.t_max.to_array()[0], hit);
+            return hit;
         }
-        let beam = Beam::of_ray(ray);
-        let mut stack = std::mem::take(&mut walk.short);
-        stack.clear();
-        stack.push(Entry { entry: ray.t_min, child: Child::Node(0) });
-        while let Some(Entry { entry, child }) = stack.pop() {
-            if entry > rays.t_max.to_array()[0] {
-                continue;
-            }
-            match child {
-                Child::Node(index) => self.open(index, &beam, &rays, &mut stack, walk),
-                Child::Leaf { kind, first, count } => {
-                    self.ray_leaf::<ANY, CULL>(kind, first..first + count, &mut rays, &mut hit, walk);
-                    if ANY && hit != RowRef::MISS {
-                        break;
-                    }
-                }
-            }
-        }
-        walk.short = stack;
-        (rays.t_max.to_array()[0], hit)
+        self.descend_single::<ANY, CULL>(Child::node(0), ray, &mut hit, walk);
+        hit
     }
 
-    /// Pushes the children that the ray may meet, the nearest last.
-    #[inline(always)]
-    fn open(&self, index: usize, beam: &Beam, rays: &RayPacket, stack: &mut Vec<Entry>, walk: &mut Walk) {
-        let node = &self.nodes[index];
-        walk.counts.boxes += LANES as u64;
-        let (entries, met) = beam.meets(&node.planes(beam.back), rays.t_max);
-        let entries = entries.to_array();
-        let (bottom, mut lanes) = (stack.len(), met.bits());
-        while lanes != 0 {
-            let slot = lanes.trailing_zeros() as usize;
-            lanes &= lanes - 1;
-            let mut at = stack.len();
-            let new = Entry { entry: entries[slot], child: node.child(slot) };
-            stack.push(new);
-            while at > bottom && stack[at - 1].entry < new.entry {
-                stack[at] = stack[at - 1];
-                at -= 1;
-            }
-            stack[at] = new;
+    /// The same from some child on, and better than `hit`.
+    pub(super) fn descend_single<const ANY: bool, const CULL: bool>(
+        &self,
+        from: Child,
+        ray: &mut RayPacket,
+        hit: &mut RowRef,
+        walk: &mut Walk,
+    ) {
+        let line = Line::new(ray);
+        let mut far = reach(ray.t_max);
+        let mut room = std::mem::take(&mut walk.singles);
+        let mut stack = Stack::new(&mut room);
+        let (mut next, mut opened) = (Some(from), 0);
+        while let Some(child) = next {
+            let nearest = match child.content() {
+                Content::Node(index) => {
+                    let node = &self.nodes[index];
+                    opened += 1;
+                    let (entries, met) = line.meets(node, far);
+                    stack.nearest_first::<ANY>(entries, met, |slot| node.child(slot))
+                }
+                Content::Leaf(leaf) => {
+                    self.ray_leaf::<ANY, CULL>(leaf, ray, hit, walk);
+                    if ANY && *hit != RowRef::MISS {
+                        break;
+                    }
+                    far = reach(ray.t_max);
+                    None
+                }
+            };
+            next = nearest.or_else(|| stack.pop(far.as_array()[0]));
         }
+        walk.counts.boxes += opened * LANES as u64;
+        walk.singles = room;
     }
 
     #[inline(always)]
     fn ray_leaf<const ANY: bool, const CULL: bool>(
         &self,
-        kind: Kind,
-        rows: std::ops::Range<usize>,
+        leaf: Leaf,
         ray: &mut RayPacket,
         hit: &mut RowRef,
         walk: &mut Walk,
     ) {
         let (stores, counts) = (&self.stores, &mut walk.counts);
-        stores.visit(kind, RayLeaf::<ANY, CULL> { stores, kind, rows, ray, hit, counts });
-        debug_assert!(ray.t_max.to_array() == float8(ray.t_max.to_array()[0]).to_array());
+        stores.visit(leaf.kind, RayLeaf::<ANY, CULL> { stores, leaf, ray, hit, counts });
     }
 }

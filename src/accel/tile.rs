@@ -1,17 +1,17 @@
-//! Sixty-four rays down the tree: all of them against eight boxes, then a lane a packet; in leaves a
-//! lane a ray.
+//! 64 rays down the tree: a lane is a packet, in leaves a ray.
 
+use super::bundle::Bundle;
+use super::descend::{Company, Room};
 use super::leaf::PacketLeaf;
-use super::node::{Beam, Child, LEAST_DIRECTION};
+use super::node::{Beam, Child, Content, Leaf, Node, reach};
 use super::{Tree, Walk};
-use crate::lanes::{Float8, LANES, Mask8, RayPacket, Vec3x8, float8};
-use crate::plan::Kind;
+use crate::lanes::{Columns, Float8, Mask8, RayPacket, Vec3x8, bits, float8, greatest};
 use crate::shapes::RowRef;
 
 /// Packets of a tile.
 pub const PACKETS: usize = 8;
 
-/// Up to 64 rays and what they met.
+/// 64 rays, best of all those of an 8 x 8 square of pixels, a packet being 4 x 2 of them.
 #[derive(Debug, Clone)]
 pub struct Tile {
     /// The rays. After a walk `t_max` is the place of the hit where there is one.
@@ -22,24 +22,45 @@ pub struct Tile {
     pub common: Option<[f32; 3]>,
 }
 
-/// A child that may hold something nearer for some packets.
-#[derive(Debug, Clone, Copy)]
-pub struct Entry {
-    entry: f32,
-    node: u32,
-    slot: u8,
-    mask: u8,
+/// A packet that is so much wider than a box goes on as rays.
+const WIDE: f32 = 1.0;
+
+/// So few rays of a packet go on alone.
+const FEW_RAYS: u32 = 2;
+
+/// The packets of a tile on their way.
+struct Packets<'a, const ANY: bool, const CULL: bool> {
+    beam: Beam,
+    whole: Beam,
+    /// Widths of origins and directions.
+    widths: [Float8; 2],
+    far: Float8,
+    farthest: Float8,
+    tile: &'a mut Tile,
+    /// Bounds of the rays of each packet, a lane a ray, where they are known already.
+    beams: &'a mut [Beam],
+    known: u32,
 }
 
-/// Directions of a tile may differ by this much of their largest coordinate, and origins by this much of
-/// the scene, before its rays go one by one. Of 0.01 to 0.35 this did the least work on shadow rays toward
-/// ground that is seen edge-on: 100,000 disks took a quarter of the time that they took at 0.35.
-const SPREAD: f32 = 0.05;
+/// The rays of one packet on their way.
+struct Rays<'a, const ANY: bool, const CULL: bool> {
+    beam: &'a Beam,
+    whole: Beam,
+    far: Float8,
+    farthest: Float8,
+    packet: usize,
+    tile: &'a mut Tile,
+}
 
 impl Tile {
     /// Rays that have met nothing yet.
     pub fn new(packets: [RayPacket; PACKETS], common: Option<[f32; 3]>) -> Self {
         Tile { packets, hits: [float8(RowRef::MISS.to_lane()); PACKETS], common }
+    }
+
+    /// Dead rays.
+    pub fn empty() -> Self {
+        Tile::new([RayPacket::dead(); PACKETS], None)
     }
 
     /// Takes the tile for new rays, which have met nothing yet; its packets are still to be set.
@@ -51,83 +72,6 @@ impl Tile {
     /// What lane `lane` of packet `packet` met.
     pub fn hit(&self, packet: usize, lane: usize) -> RowRef {
         RowRef::from_lane(self.hits[packet].as_array()[lane])
-    }
-
-    /// Bounds of each packet, a lane a packet; `None` if they do not all go the same way or not together.
-    fn beam(&self, scene_size: f32) -> Option<Beam> {
-        let live = self.packets.map(|rays| rays.live());
-        let start = Float8::from(std::array::from_fn(|p| least(self.packets[p].t_min)));
-        // Behind the origins the nearest and the farthest ray change places.
-        if least(start) < 0.0 {
-            return None;
-        }
-        let bounds = |axis: fn(&RayPacket) -> Float8| {
-            let of = |fill: f32| -> [Float8; PACKETS] {
-                let lanes = std::array::from_fn(|p| live[p].select(axis(&self.packets[p]), float8(fill)));
-                Float8::transpose(lanes)
-            };
-            let low = of(f32::INFINITY).into_iter().reduce(Float8::fast_min).expect("eight rows");
-            let high = of(f32::NEG_INFINITY).into_iter().reduce(Float8::fast_max).expect("eight rows");
-            (low, high)
-        };
-        let dirs = [bounds(|rays| rays.dir.x), bounds(|rays| rays.dir.y), bounds(|rays| rays.dir.z)];
-        let origins = match self.common {
-            Some(origin) => origin.map(|x| (float8(x), float8(x))),
-            None => [bounds(|rays| rays.origin.x), bounds(|rays| rays.origin.y), bounds(|rays| rays.origin.z)],
-        };
-        let (mut back, mut spread, mut largest) = ([false; 3], 0f32, 0f32);
-        for k in 0..3 {
-            let (low, high) = (least(dirs[k].0), greatest(dirs[k].1));
-            if low < 0.0 && high > 0.0 {
-                return None;
-            }
-            back[k] = low < 0.0;
-            spread = spread.max(high - low);
-            largest = largest.max(high.abs()).max(low.abs());
-            let apart = greatest(origins[k].1) - least(origins[k].0);
-            if apart > SPREAD * scene_size {
-                return None;
-            }
-        }
-        if spread > SPREAD * largest {
-            return None;
-        }
-        let inverse = |d: Float8, back: bool| {
-            let magnitude = float8(1.0) / d.abs().fast_max(float8(LEAST_DIRECTION));
-            if back { -magnitude } else { magnitude }
-        };
-        let pick = |(low, high): (Float8, Float8), first: bool| if first { low } else { high };
-        Some(Beam {
-            origin_near: std::array::from_fn(|k| pick(origins[k], back[k])),
-            origin_far: std::array::from_fn(|k| pick(origins[k], !back[k])),
-            inv_near: std::array::from_fn(|k| inverse(pick(dirs[k], back[k]), back[k])),
-            inv_far: std::array::from_fn(|k| inverse(pick(dirs[k], !back[k]), back[k])),
-            back,
-            start,
-        })
-    }
-}
-
-impl Beam {
-    /// Bounds of all packets of a mask together, in all lanes.
-    fn union(&self, live: Mask8) -> Beam {
-        let fold = |values: [Float8; 3], largest: [bool; 3]| -> [Float8; 3] {
-            std::array::from_fn(|k| {
-                float8(match largest[k] {
-                    true => greatest(live.select(values[k], float8(f32::NEG_INFINITY))),
-                    false => least(live.select(values[k], float8(f32::INFINITY))),
-                })
-            })
-        };
-        let forth = self.back.map(|back| !back);
-        Beam {
-            origin_near: fold(self.origin_near, forth),
-            origin_far: fold(self.origin_far, self.back),
-            inv_near: fold(self.inv_near, self.back),
-            inv_far: fold(self.inv_far, forth),
-            back: self.back,
-            start: float8(least(self.start)),
-        }
     }
 }
 
@@ -146,120 +90,206 @@ impl Tree {
     }
 
     fn walk_tile<const ANY: bool, const CULL: bool>(&self, tile: &mut Tile, walk: &mut Walk) {
-        let live = lanes_of(|p| tile.packets[p].live().any());
+        let live = (0..PACKETS).map(|p| u32::from(tile.packets[p].live().any()) << p).sum();
         if live == 0 {
             return;
         }
-        let Some(beam) = tile.beam(self.size).filter(|_| !self.one_by_one) else {
-            return self.walk_one_by_one::<ANY, CULL>(tile, walk);
+        self.make_room(walk);
+        let one_by_one = match self.one_by_one {
+            true => live,
+            false => self.walk_together::<ANY, CULL>(live, tile, walk),
         };
-        let planes = 0..self.stores.count(Kind::Plane);
-        if !planes.is_empty() {
-            self.tile_leaf::<ANY, CULL>(Kind::Plane, planes, live, tile, walk);
+        bits(one_by_one).for_each(|p| self.walk_one_by_one::<ANY, CULL>(p, tile, walk));
+    }
+
+    /// Packets that go the same way, all together or each on its own. Left are those whose own rays do not.
+    fn walk_together<const ANY: bool, const CULL: bool>(&self, all: u32, tile: &mut Tile, walk: &mut Walk) -> u32 {
+        let bundle = Bundle::new::<ANY>(tile, all);
+        let merged = bundle.merged(all);
+        let together = merged.narrow(self.size) != 0;
+        let live = if together { all } else { all & bundle.narrow(self.size) };
+        if live == 0 {
+            return all;
+        }
+        for leaf in &self.planes {
+            tile.meet::<ANY, CULL>(self, *leaf, live, walk);
+        }
+        let (mut beams, mut room) = (std::mem::take(&mut walk.beams), std::mem::take(&mut walk.companies));
+        let (beam, whole) = (bundle.beam(live), merged.beam(live));
+        beams.resize(PACKETS, beam);
+        let (widths, far, farthest) = (bundle.widths(), reach(bundle.far), Float8::ZERO);
+        let mut packets =
+            Packets::<ANY, CULL> { beam, whole, widths, far, farthest, tile, beams: &mut beams, known: 0 };
+        packets.look_again(live);
+        match (self.nodes.is_empty(), together) {
+            (true, _) => {}
+            (_, true) => self.descend::<ANY, _>(&mut packets, Child::node(0), live, &mut room, walk),
+            (_, false) => packets.alone(self, Child::node(0), live, &mut room, walk),
+        }
+        (walk.beams, walk.companies) = (beams, room);
+        all & !live
+    }
+
+    /// One ray of a tile, from some child on.
+    fn go_on<const ANY: bool, const CULL: bool>(
+        &self,
+        from: Child,
+        tile: &mut Tile,
+        (packet, lane): (usize, usize),
+        walk: &mut Walk,
+    ) {
+        let (rays, hits) = (&mut tile.packets[packet], &mut tile.hits[packet]);
+        let mut ray = rays.broadcast(lane);
+        let mut row = RowRef::from_lane(hits.as_array()[lane]);
+        self.descend_single::<ANY, CULL>(from, &mut ray, &mut row, walk);
+        if ANY && row != RowRef::MISS {
+            rays.t_min.as_mut_array()[lane] = f32::INFINITY;
+            rays.t_max.as_mut_array()[lane] = f32::NEG_INFINITY;
+        } else {
+            rays.t_max.as_mut_array()[lane] = ray.t_max.as_array()[0];
+            hits.as_mut_array()[lane] = row.to_lane();
+        }
+    }
+
+    fn walk_one_by_one<const ANY: bool, const CULL: bool>(&self, packet: usize, tile: &mut Tile, walk: &mut Walk) {
+        for leaf in &self.planes {
+            tile.meet::<ANY, CULL>(self, *leaf, 1 << packet, walk);
         }
         if !self.nodes.is_empty() {
-            self.walk_nodes::<ANY, CULL>(&beam, live, tile, walk);
+            let live = tile.packets[packet].live();
+            live.lanes().for_each(|lane| self.go_on::<ANY, CULL>(Child::node(0), tile, (packet, lane), walk));
         }
     }
+}
 
-    fn walk_nodes<const ANY: bool, const CULL: bool>(&self, beam: &Beam, live: u32, tile: &mut Tile, walk: &mut Walk) {
-        let whole = beam.union(Mask8::from_bits(live));
-        let mut far = Float8::from(std::array::from_fn(|p| greatest(tile.packets[p].t_max)));
-        let mut stack = std::mem::take(&mut walk.stack);
-        stack.clear();
-        self.open_tile(0, &whole, live as u8, greatest(far), &mut stack, walk);
-        while let Some(Entry { entry, node, slot, mask }) = stack.pop() {
-            let node = &self.nodes[node as usize];
-            if entry > greatest(far) {
-                continue;
-            }
-            walk.counts.boxes += LANES as u64;
-            let (_, met) = beam.meets(&node.planes_of(usize::from(slot), beam.back), far);
-            let mask = met.bits() & u32::from(mask);
-            if mask == 0 {
-                continue;
-            }
-            match node.child(usize::from(slot)) {
-                Child::Node(index) => self.open_tile(index, &whole, mask as u8, greatest(far), &mut stack, walk),
-                Child::Leaf { kind, first, count } => {
-                    let mut touched = self.tile_leaf::<ANY, CULL>(kind, first..first + count, mask, tile, walk);
-                    while touched != 0 {
-                        let p = touched.trailing_zeros() as usize;
-                        touched &= touched - 1;
-                        far.as_mut_array()[p] = greatest(tile.packets[p].t_max);
-                    }
-                }
-            }
-        }
-        walk.stack = stack;
-    }
-
-    /// Pushes the children that some packet may meet, the nearest last.
+impl Tile {
+    /// Holds some packets against a leaf: those in which something was met.
     #[inline(always)]
-    fn open_tile(&self, index: usize, whole: &Beam, mask: u8, far: f32, stack: &mut Vec<Entry>, walk: &mut Walk) {
-        let node = &self.nodes[index];
-        walk.counts.boxes += LANES as u64;
-        let (entries, met) = whole.meets(&node.planes(whole.back), float8(far));
-        let entries = entries.to_array();
-        let (bottom, mut lanes) = (stack.len(), met.bits());
-        while lanes != 0 {
-            let slot = lanes.trailing_zeros();
-            lanes &= lanes - 1;
-            let new = Entry { entry: entries[slot as usize], node: index as u32, slot: slot as u8, mask };
-            let mut at = stack.len();
-            stack.push(new);
-            while at > bottom && stack[at - 1].entry < new.entry {
-                stack[at] = stack[at - 1];
-                at -= 1;
-            }
-            stack[at] = new;
-        }
+    fn meet<const ANY: bool, const CULL: bool>(&mut self, tree: &Tree, leaf: Leaf, mask: u32, walk: &mut Walk) -> u32 {
+        let (stores, counts) = (&tree.stores, &mut walk.counts);
+        let (packets, hits) = (&mut self.packets[..], &mut self.hits[..]);
+        let common = self.common.map(Vec3x8::splat);
+        stores.visit(leaf.kind, PacketLeaf::<ANY, CULL> { stores, leaf, packets, hits, mask, common, counts })
+    }
+}
+
+impl<const ANY: bool, const CULL: bool> Company for Packets<'_, ANY, CULL> {
+    fn beam(&self) -> &Beam {
+        &self.beam
     }
 
+    fn open(&self, node: &Node, members: u32) -> (Float8, Mask8) {
+        if members & (members - 1) == 0 {
+            let p = members.trailing_zeros() as usize;
+            return self.beam.broadcast(p).meets_children(node, self.far.broadcast(p));
+        }
+        self.whole.meets_children(node, self.farthest)
+    }
+
+    fn far(&self) -> Float8 {
+        self.far
+    }
+
+    fn farthest(&self) -> f32 {
+        self.farthest.as_array()[0]
+    }
+
+    fn wider_than(&self, size: Float8, places: Float8) -> u32 {
+        Mask8::gt(places.mul_add(self.widths[1], self.widths[0]), size * float8(WIDE)).bits()
+    }
+
+    fn part_ways(&self, _: &Content, _: u32) -> bool {
+        false
+    }
+
+    fn alone(&mut self, tree: &Tree, child: Child, members: u32, room: &mut Room, walk: &mut Walk) {
+        for p in bits(members) {
+            let live = self.tile.packets[p].live().bits();
+            if self.known >> p & 1 == 0 {
+                self.beams[p] = Bundle::of_rays(&self.tile.packets[p]).beam(live);
+                self.known |= 1 << p;
+            }
+            let (whole, farthest) = (self.beam.broadcast(p), self.far.broadcast(p));
+            let far = reach(self.tile.packets[p].t_max);
+            let mut rays = Rays::<ANY, CULL> { beam: &self.beams[p], whole, far, farthest, packet: p, tile: self.tile };
+            tree.descend::<ANY, _>(&mut rays, child, live, room, walk);
+        }
+        self.look_again(members);
+    }
+
+    fn leaf(&mut self, tree: &Tree, leaf: Leaf, members: u32, walk: &mut Walk) {
+        let touched = self.tile.meet::<ANY, CULL>(tree, leaf, members, walk);
+        self.look_again(touched);
+    }
+}
+
+impl<const ANY: bool, const CULL: bool> Packets<'_, ANY, CULL> {
+    /// Sees how far some packets still look.
     #[inline(always)]
-    fn tile_leaf<const ANY: bool, const CULL: bool>(
-        &self,
-        kind: Kind,
-        rows: std::ops::Range<usize>,
-        mask: u32,
-        tile: &mut Tile,
-        walk: &mut Walk,
-    ) -> u32 {
-        let (stores, counts) = (&self.stores, &mut walk.counts);
-        let (packets, hits) = (&mut tile.packets[..], &mut tile.hits[..]);
-        let common = tile.common.map(Vec3x8::splat);
-        stores.visit(kind, PacketLeaf::<ANY, CULL> { stores, kind, rows, packets, hits, mask, common, counts })
+    fn look_again(&mut self, packets: u32) {
+        for p in bits(packets) {
+            let rays = &self.tile.packets[p];
+            let limit = match ANY {
+                true if rays.live().any() => continue,
+                true => f32::NEG_INFINITY,
+                false => greatest(reach(rays.t_max)),
+            };
+            self.far.as_mut_array()[p] = limit;
+        }
+        self.farthest = float8(greatest(self.far));
+    }
+}
+
+impl<const ANY: bool, const CULL: bool> Company for Rays<'_, ANY, CULL> {
+    fn beam(&self) -> &Beam {
+        self.beam
     }
 
-    fn walk_one_by_one<const ANY: bool, const CULL: bool>(&self, tile: &mut Tile, walk: &mut Walk) {
-        for (rays, hits) in tile.packets.iter_mut().zip(&mut tile.hits) {
-            let mut live = rays.live().bits();
-            while live != 0 {
-                let lane = live.trailing_zeros() as usize;
-                live &= live - 1;
-                let (t, row) = self.walk_single::<ANY, CULL>(&rays.lane(lane), walk);
-                if ANY && row != RowRef::MISS {
-                    rays.t_min.as_mut_array()[lane] = f32::INFINITY;
-                    rays.t_max.as_mut_array()[lane] = f32::NEG_INFINITY;
-                } else {
-                    rays.t_max.as_mut_array()[lane] = t;
-                    hits.as_mut_array()[lane] = row.to_lane();
-                }
-            }
+    fn open(&self, node: &Node, _: u32) -> (Float8, Mask8) {
+        self.whole.meets_children(node, self.farthest)
+    }
+
+    fn far(&self) -> Float8 {
+        self.far
+    }
+
+    fn farthest(&self) -> f32 {
+        self.farthest.as_array()[0]
+    }
+
+    fn wider_than(&self, _: Float8, _: Float8) -> u32 {
+        0
+    }
+
+    fn part_ways(&self, content: &Content, members: u32) -> bool {
+        match content {
+            Content::Node(_) => members.count_ones() <= FEW_RAYS,
+            Content::Leaf(leaf) => 2 * members.count_ones() <= leaf.count as u32,
+        }
+    }
+
+    fn alone(&mut self, tree: &Tree, child: Child, members: u32, _: &mut Room, walk: &mut Walk) {
+        bits(members).for_each(|lane| tree.go_on::<ANY, CULL>(child, self.tile, (self.packet, lane), walk));
+        self.look_again();
+    }
+
+    fn leaf(&mut self, tree: &Tree, leaf: Leaf, _: u32, walk: &mut Walk) {
+        if self.tile.meet::<ANY, CULL>(tree, leaf, 1 << self.packet, walk) != 0 {
+            self.look_again();
         }
     }
 }
 
-fn lanes_of(f: impl Fn(usize) -> bool) -> u32 {
-    (0..PACKETS).map(|p| u32::from(f(p)) << p).sum()
-}
-
-#[inline(always)]
-fn least(x: Float8) -> f32 {
-    x.to_array().into_iter().fold(f32::INFINITY, f32::min)
-}
-
-#[inline(always)]
-fn greatest(x: Float8) -> f32 {
-    x.to_array().into_iter().fold(f32::NEG_INFINITY, f32::max)
+impl<const ANY: bool, const CULL: bool> Rays<'_, ANY, CULL> {
+    /// Sees how far the rays still look.
+    #[inline(always)]
+    fn look_again(&mut self) {
+        let rays = &self.tile.packets[self.packet];
+        self.far = reach(rays.t_max);
+        match ANY {
+            // The whole may be seen from the other end: it looks all the way as long as some ray looks.
+            true if rays.live().any() => {}
+            _ => self.farthest = float8(greatest(self.far)),
+        }
+    }
 }

@@ -5,18 +5,14 @@ use glam::DVec3;
 use super::direct::Direct;
 use super::hits::{Exact, Shaded};
 use super::wave::{Branch, Wave, lanes};
-use crate::accel::PACKETS;
 use crate::lanes::Vec3x8;
 
 impl Direct<'_> {
     /// The rays that go on: reflected, refracted.
-    pub(super) fn branches(&self, wave: &Wave, shaded: &[Option<Shaded>; PACKETS]) -> (Vec<Branch>, Vec<Branch>) {
+    pub(super) fn branches(&self, wave: &Wave, shaded: &[Shaded]) -> (Vec<Branch>, Vec<Branch>) {
         let (mut reflected, mut refracted) = (Vec::new(), Vec::new());
-        for (p, shaded) in shaded.iter().enumerate() {
-            let Some((shaded, exact)) = shaded.as_ref().and_then(|shaded| Some((shaded, shaded.exact.as_ref()?)))
-            else {
-                continue;
-            };
+        for shaded in shaded {
+            let (p, Some(exact)) = (shaded.packet, &shaded.exact) else { continue };
             let origins = [shaded.leave(false, shaded.error), shaded.leave(true, shaded.error)].map(Vec3x8::to_arrays);
             let (colors, weights) = (shaded.bsdf.color.to_arrays(), wave.weight[p].to_arrays());
             for i in lanes(shaded.hit) {

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::lanes::{Float8, LANES, Mask8, RayPacket, Vec3x8, float8};
-use crate::sample::{self, Pattern, dimension};
+use crate::sample::{self, Pattern, Pattern8, dimension};
 use crate::scene::{Camera, Filter, FilterTable, Lens};
 
 /// One camera over one display window.
@@ -81,10 +81,9 @@ impl CameraRays {
         if self.centered {
             return points;
         }
-        let bits: [[u32; 2]; LANES] = std::array::from_fn(|lane| samples.pattern[lane].sample(samples.index[lane]));
-        for (k, axis) in points.iter_mut().enumerate() {
-            for (x, bits) in axis.iter_mut().zip(&bits) {
-                *x += self.filter.offset(sample::unit(bits[k]));
+        for (axis, bits) in points.iter_mut().zip(samples.pattern.sample(&samples.index)) {
+            for lane in 0..LANES {
+                axis[lane] += self.filter.offset(bits[lane]);
             }
         }
         points
@@ -99,9 +98,18 @@ pub struct Samples8 {
     /// Rows of the pixels.
     pub y: [i32; LANES],
     /// Sample patterns of the pixels.
-    pub pattern: [Pattern; LANES],
+    pub pattern: Pattern8,
     /// Indices of the samples.
     pub index: [u32; LANES],
+}
+
+impl Samples8 {
+    /// Sets one sample: its pixel, that one's pattern, and its index.
+    #[inline(always)]
+    pub fn set(&mut self, lane: usize, (x, y): (i32, i32), pattern: Pattern, index: u32) {
+        (self.x[lane], self.y[lane], self.index[lane]) = (x, y, index);
+        self.pattern.set(lane, pattern);
+    }
 }
 
 /// Origins and directions of eight rays in f64, by axis.

@@ -7,7 +7,7 @@ use super::hits::Shaded;
 use super::record::{RayCounts, RayKind, Record};
 use super::wave::{Branch, Wave, lanes};
 use crate::accel::{PACKETS, Tile, Tree, Walk};
-use crate::lanes::{Float8, LANES, Mask8, RayPacket, Vec3x8, float8};
+use crate::lanes::{Float8, LANES, Mask8, Vec3x8, float8};
 use crate::plan::Plan;
 use crate::shade::{Backdrop8, LightTable, MaterialTable};
 use crate::shapes::RowRef;
@@ -45,13 +45,14 @@ pub struct Room {
     /// Tiles that are done with; boxed, since they go from hand to hand and are large.
     #[allow(clippy::vec_box)] // or each would be copied in and out
     pub(super) tiles: Vec<Box<Tile>>,
+    /// Hits that are being shaded.
+    shaded: Vec<Shaded>,
 }
 
 impl Room {
     /// A tile whose packets are to be set.
     pub fn tile(&mut self, common: Option<[f32; 3]>) -> Box<Tile> {
-        let dead = RayPacket::new(Vec3x8::ZERO, Vec3x8::splat([1.0; 3]), Float8::ZERO, Mask8::NONE);
-        let mut tile = self.tiles.pop().unwrap_or_else(|| Box::new(Tile::new([dead; PACKETS], None)));
+        let mut tile = self.tiles.pop().unwrap_or_else(|| Box::new(Tile::empty()));
         tile.renew(common);
         tile
     }
@@ -106,11 +107,11 @@ impl<'s> Direct<'s> {
     }
 
     fn trace<R: Record>(&self, mut wave: Wave, sink: &mut Sink<R>, waiting: &mut Vec<Later>) {
-        let live = wave.tile.packets.map(|rays| rays.live().bits());
+        let live: [u32; PACKETS] = std::array::from_fn(|p| wave.tile.packets[p].live().bits());
         let redecided = sink.room.walk.counts.redecided;
         self.tree.closest_tile(&mut wave.tile, &mut sink.room.walk);
         sink.room.rays.redecided[wave.kind as usize] += sink.room.walk.counts.redecided - redecided;
-        let mut shaded = [const { None }; PACKETS];
+        let mut shaded = std::mem::take(&mut sink.room.shaded);
         for (p, live) in live.into_iter().enumerate().filter(|(_, live)| *live != 0) {
             let hit = lanes(live).filter(|i| wave.tile.hit(p, *i) != RowRef::MISS).map(|i| 1 << i).sum::<u32>();
             sink.room.rays.rays[wave.kind as usize] += u64::from(live.count_ones());
@@ -120,7 +121,7 @@ impl<'s> Direct<'s> {
             }
             self.add_background(&wave, p, live & !hit, sink.samples);
             if hit != 0 {
-                shaded[p] = Some(self.shade(&wave, p, hit, sink.record));
+                shaded.push(self.shade(&wave, p, hit, sink.record));
             }
         }
         self.add_ambient(&wave, &shaded, sink.samples);
@@ -136,6 +137,8 @@ impl<'s> Direct<'s> {
                 }
             }
         }
+        shaded.clear();
+        sink.room.shaded = shaded;
         sink.room.tiles.push(wave.tile);
     }
 
@@ -161,9 +164,9 @@ impl<'s> Direct<'s> {
         }
     }
 
-    fn add_ambient(&self, wave: &Wave, shaded: &[Option<Shaded>; PACKETS], samples: &mut Samples) {
-        for (p, shaded) in shaded.iter().enumerate() {
-            let Some(shaded) = shaded else { continue };
+    fn add_ambient(&self, wave: &Wave, shaded: &[Shaded], samples: &mut Samples) {
+        for shaded in shaded {
+            let p = shaded.packet;
             let albedo = shaded.bsdf.color * shaded.bsdf.diffuse;
             samples.add(wave, p, albedo.scale(self.ambient).scale(wave.weight[p]), shaded.hit);
         }

@@ -8,10 +8,12 @@ use super::wave::{Wave, lanes};
 use crate::lanes::{Float8, LANES, Mask8, UNIT_ROUNDOFF, Vec3x8, float8};
 use crate::plan::Owner;
 use crate::shade::{Bsdf8, Facing, attributes};
-use crate::shapes::{Ray64, RowRef, Surface8};
+use crate::shapes::{Ray64, Surface8};
 
 /// Eight hits, made ready for light.
+#[derive(Debug)]
 pub struct Shaded {
+    pub packet: usize,
     pub hit: u32,
     pub front: Mask8,
     pub point: Vec3x8,
@@ -29,7 +31,7 @@ pub struct Shaded {
 }
 
 /// One hit in f64, as rays go on from it.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy)]
 pub struct Exact {
     pub point: DVec3,
     pub facing: Facing,
@@ -47,21 +49,16 @@ impl Direct<'_> {
     /// What the lights and the rays that go on need of the hits of a packet.
     pub(super) fn shade<R: Record>(&self, wave: &Wave, p: usize, hit: u32, record: &mut R) -> Shaded {
         let (rays, stores) = (&wave.tile.packets[p], self.tree.stores());
-        let rows: [RowRef; LANES] = std::array::from_fn(|i| wave.tile.hit(p, i));
-        let mut surface = stores.surface(wave.tile.hits[p], rays, rays.t_max);
+        let (mut surface, owners) = stores.surface::<false>(wave.tile.hits[p], rays, rays.t_max);
         let exact = self.refine(wave, p, hit, &mut surface);
         let front = Mask8::sign(surface.normal.dot(rays.dir));
         let n_g = Vec3x8::select(front, surface.normal, -surface.normal);
         let any = hit.trailing_zeros() as usize;
-        let owner = |i: usize| match rows[i].kind() {
-            Some(kind) => stores.owner(kind, rows[i].row()),
-            None => Owner { primitive: 0, material: 0 },
-        };
-        let owners: [Owner; LANES] = std::array::from_fn(owner);
         let fronts = front.bits();
         let side = |i: usize| self.plan.side_material(owners[i].material, fronts >> i & 1 == 1);
         let materials = std::array::from_fn(|i| side(if hit >> i & 1 == 1 { i } else { any }));
         let mut shaded = Shaded {
+            packet: p,
             hit,
             front,
             point: surface.point,

@@ -21,7 +21,7 @@ impl Direct<'_> {
         &self,
         (index, light): (usize, &Illumination),
         wave: &Wave,
-        shaded: &[Option<Shaded>; PACKETS],
+        shaded: &[Shaded],
         sink: &mut Sink<R>,
     ) {
         let mut shares = self.shares(light, wave, shaded);
@@ -39,10 +39,10 @@ impl Direct<'_> {
         }
     }
 
-    fn shares(&self, light: &Illumination, wave: &Wave, shaded: &[Option<Shaded>; PACKETS]) -> Shares {
+    fn shares(&self, light: &Illumination, wave: &Wave, shaded: &[Shaded]) -> Shares {
         let mut shares = Shares { radiance: [Vec3x8::ZERO; PACKETS], lit: [0; PACKETS] };
-        for (p, shaded) in shaded.iter().enumerate() {
-            let Some(shaded) = shaded else { continue };
+        for shaded in shaded {
+            let p = shaded.packet;
             let (wi, strength) = light.sample(shaded.point);
             let (share, facing) = shaded.share(wi, strength);
             let share = share.scale(wave.weight[p]);
@@ -58,7 +58,7 @@ impl Direct<'_> {
         &self,
         (index, light): (usize, &Illumination),
         wave: &Wave,
-        shaded: &[Option<Shaded>; PACKETS],
+        shaded: &[Shaded],
         lit: &mut [u32; PACKETS],
         sink: &mut Sink<R>,
     ) {
@@ -66,10 +66,13 @@ impl Direct<'_> {
             Toward::Point(position) => Some(position),
             Toward::Direction(_) => None,
         };
-        let dead = RayPacket::new(Vec3x8::ZERO, Vec3x8::splat([1.0; 3]), Float8::ZERO, Mask8::NONE);
         let mut tile = sink.room.tile(common);
+        let mut rest = shaded.iter().peekable();
         for (p, packet) in tile.packets.iter_mut().enumerate() {
-            *packet = shaded[p].as_ref().map_or(dead, |shaded| shaded.shadow_rays(light, Mask8::from_bits(lit[p])));
+            *packet = match rest.next_if(|shaded| shaded.packet == p) {
+                Some(shaded) if lit[p] != 0 => shaded.shadow_rays(light, Mask8::from_bits(lit[p])),
+                _ => RayPacket::dead(),
+            };
         }
         let told = R::ON.then_some(tile.packets);
         let redecided = sink.room.walk.counts.redecided;

@@ -1,91 +1,91 @@
-//! One quantity of all primitives of a kind.
+//! Quantities of eight rows side by side: what a block of a structure of arrays is made of.
 
 use glam::DVec3;
 
 use super::{Float8, LANES, Vec3x8, float8};
 
-/// One f32 a row. Behind the last row stand eight of NaN, which no ray can hit, so that a block may
-/// start at any row.
-#[derive(Debug, Clone)]
-pub struct Column(Vec<f32>);
-
-/// Three columns: a vector a row.
-#[derive(Debug, Clone)]
-pub struct Column3 {
-    x: Column,
-    y: Column,
-    z: Column,
+/// One or several quantities of eight rows, a lane a row.
+pub trait Columns: Copy {
+    /// The quantities of one row in f64.
+    type One: Copy;
+    /// Eight rows, rounded to f32; missing ones are NaN, which no ray can hit.
+    fn pack(rows: [Option<Self::One>; LANES]) -> Self;
+    /// The row of one lane in all lanes.
+    fn broadcast(&self, lane: usize) -> Self;
+    /// Lane `i` is a lane of the `i`th block.
+    fn gather(rows: [(&Self, usize); LANES]) -> Self;
 }
 
-impl Column {
-    /// Stores the rows, rounded to f32.
-    pub fn new(rows: impl Iterator<Item = f64>) -> Self {
-        let padding = [f32::NAN; LANES];
-        Column(rows.map(|x| x as f32).chain(padding).collect())
+impl Columns for Float8 {
+    type One = f64;
+
+    fn pack(rows: [Option<f64>; LANES]) -> Self {
+        Float8::from(rows.map(|row| row.map_or(f32::NAN, |x| x as f32)))
     }
 
-    /// Row `i` in all lanes.
     #[inline(always)]
-    pub fn splat(&self, i: usize) -> Float8 {
-        float8(self.0[i])
+    fn broadcast(&self, lane: usize) -> Self {
+        float8(self.as_array()[lane % LANES])
     }
 
-    /// Rows `first..first + 8`, a lane each.
     #[inline(always)]
-    pub fn block(&self, first: usize) -> Float8 {
-        let rows: [f32; LANES] = self.0[first..first + LANES].try_into().expect("eight rows");
-        Float8::from(rows)
-    }
-
-    /// Lane `k` is row `rows[k]`.
-    #[inline(always)]
-    pub fn gather(&self, rows: [u32; LANES]) -> Float8 {
-        let mut lanes = [0.0; LANES];
-        for (lane, row) in lanes.iter_mut().zip(rows) {
-            *lane = self.0[row as usize];
-        }
-        Float8::from(lanes)
-    }
-
-    /// Row `i`.
-    #[inline(always)]
-    pub fn row(&self, i: usize) -> f32 {
-        self.0[i]
-    }
-
-    /// Memory in bytes.
-    pub fn bytes(&self) -> usize {
-        self.0.capacity() * size_of::<f32>()
+    fn gather(rows: [(&Self, usize); LANES]) -> Self {
+        Float8::from(rows.map(|(block, lane)| block.as_array()[lane % LANES]))
     }
 }
 
-impl Column3 {
-    /// Stores the rows, rounded to f32.
-    pub fn new(rows: impl Iterator<Item = DVec3> + Clone) -> Self {
-        let axis = |k: usize| Column::new(rows.clone().map(move |v| v[k]));
-        Column3 { x: axis(0), y: axis(1), z: axis(2) }
+impl Columns for Vec3x8 {
+    type One = DVec3;
+
+    fn pack(rows: [Option<DVec3>; LANES]) -> Self {
+        let axis = |k: usize| Float8::pack(rows.map(|row| row.map(|v| v[k])));
+        Vec3x8::new(axis(0), axis(1), axis(2))
     }
 
-    /// Row `i` in all lanes.
     #[inline(always)]
-    pub fn splat(&self, i: usize) -> Vec3x8 {
-        Vec3x8::new(self.x.splat(i), self.y.splat(i), self.z.splat(i))
+    fn broadcast(&self, lane: usize) -> Self {
+        Vec3x8::new(self.x.broadcast(lane), self.y.broadcast(lane), self.z.broadcast(lane))
     }
 
-    /// Rows `first..first + 8`, a lane each.
     #[inline(always)]
-    pub fn block(&self, first: usize) -> Vec3x8 {
-        Vec3x8::new(self.x.block(first), self.y.block(first), self.z.block(first))
+    fn gather(rows: [(&Self, usize); LANES]) -> Self {
+        let axis = |f: fn(&Vec3x8) -> &Float8| Float8::gather(rows.map(|(block, lane)| (f(block), lane)));
+        Vec3x8::new(axis(|v| &v.x), axis(|v| &v.y), axis(|v| &v.z))
+    }
+}
+
+impl<C: Columns, const N: usize> Columns for [C; N] {
+    type One = [C::One; N];
+
+    fn pack(rows: [Option<[C::One; N]>; LANES]) -> Self {
+        std::array::from_fn(|k| C::pack(rows.map(|row| row.map(|all| all[k]))))
     }
 
-    /// Lane `k` is row `rows[k]`.
     #[inline(always)]
-    pub fn gather(&self, rows: [u32; LANES]) -> Vec3x8 {
-        Vec3x8::new(self.x.gather(rows), self.y.gather(rows), self.z.gather(rows))
+    fn broadcast(&self, lane: usize) -> Self {
+        std::array::from_fn(|k| self[k].broadcast(lane))
     }
 
-    /// Memory in bytes.
-    pub fn bytes(&self) -> usize {
-        self.x.bytes() + self.y.bytes() + self.z.bytes()
+    #[inline(always)]
+    fn gather(rows: [(&Self, usize); LANES]) -> Self {
+        std::array::from_fn(|k| C::gather(rows.map(|(block, lane)| (&block[k], lane))))
+    }
+}
+
+impl<A: Columns, B: Columns> Columns for (A, B) {
+    type One = (A::One, B::One);
+
+    fn pack(rows: [Option<(A::One, B::One)>; LANES]) -> Self {
+        (A::pack(rows.map(|row| row.map(|both| both.0))), B::pack(rows.map(|row| row.map(|both| both.1))))
+    }
+
+    #[inline(always)]
+    fn broadcast(&self, lane: usize) -> Self {
+        (self.0.broadcast(lane), self.1.broadcast(lane))
+    }
+
+    #[inline(always)]
+    fn gather(rows: [(&Self, usize); LANES]) -> Self {
+        (A::gather(rows.map(|(block, lane)| (&block.0, lane))), B::gather(rows.map(|(block, lane)| (&block.1, lane))))
     }
 }

@@ -30,6 +30,18 @@ impl Mask8 {
         self.0.to_bitmask() != 0
     }
 
+    /// Whether all lanes are yes.
+    #[inline(always)]
+    pub fn all(self) -> bool {
+        self.0.to_bitmask() == 0xff
+    }
+
+    /// The lanes that are yes, from the lowest.
+    #[inline(always)]
+    pub fn lanes(self) -> impl Iterator<Item = usize> {
+        bits(self.bits())
+    }
+
     /// Per lane `yes` or `no`, bit for bit.
     #[inline(always)]
     pub fn select(self, yes: Float8, no: Float8) -> Float8 {
@@ -65,6 +77,16 @@ impl Mask8 {
     pub fn sign(a: Float8) -> Self {
         Mask8(a)
     }
+}
+
+/// The numbers of the bits that are set, from the lowest.
+#[inline(always)]
+pub fn bits(mut set: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lowest = (set != 0).then(|| set.trailing_zeros() as usize);
+        set &= set.wrapping_sub(1);
+        lowest
+    })
 }
 
 impl BitAnd for Mask8 {

@@ -10,9 +10,9 @@ mod packet;
 mod ray;
 mod vec3;
 
-pub use column::{Column, Column3};
-pub use float::{Float8, difference_of_products, float8, square_sum_minus};
-pub use mask::Mask8;
+pub use column::Columns;
+pub use float::{Float8, difference_of_products, float8, greatest, least};
+pub use mask::{Mask8, bits};
 pub use packet::{Hit8, RayPacket};
 pub use ray::Ray;
 pub use vec3::Vec3x8;

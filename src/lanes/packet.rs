@@ -1,6 +1,6 @@
 //! Eight rays, eight hits.
 
-use super::{Float8, LANES, Mask8, Ray, Vec3x8, float8};
+use super::{Columns, Float8, LANES, Mask8, Ray, Vec3x8, float8};
 
 /// Eight rays. A dead lane has an empty interval, `t_min = +inf` and `t_max = -inf`, which accepts
 /// nothing, so kernels carry no extra mask.
@@ -22,10 +22,21 @@ impl RayPacket {
     /// Eight rays that are known to be valid; the lanes of `live` take part.
     #[inline(always)]
     pub fn new(origin: Vec3x8, dir: Vec3x8, t_max: Float8, live: Mask8) -> Self {
-        let inv_dd = float8(1.0) / dir.dot(dir);
         let t_min = live.select(float8(0.0), float8(f32::INFINITY));
         let t_max = live.select(t_max, float8(f32::NEG_INFINITY));
-        RayPacket { origin, dir, t_min, t_max, inv_dd }
+        RayPacket::within(origin, dir, t_min, t_max)
+    }
+
+    /// Eight rays that hit nothing.
+    #[inline(always)]
+    pub fn dead() -> Self {
+        RayPacket::new(Vec3x8::ZERO, Vec3x8::splat([1.0; 3]), Float8::ZERO, Mask8::NONE)
+    }
+
+    /// Eight rays with ends, which tell the dead ones.
+    #[inline(always)]
+    pub fn within(origin: Vec3x8, dir: Vec3x8, t_min: Float8, t_max: Float8) -> Self {
+        RayPacket { origin, dir, t_min, t_max, inv_dd: float8(1.0) / dir.dot(dir) }
     }
 
     /// Up to eight rays; what is missing or invalid is dead.
@@ -43,15 +54,43 @@ impl RayPacket {
         }
     }
 
-    /// One ray in all lanes.
+    /// One valid ray in all lanes.
+    #[inline(always)]
     pub fn splat(ray: &Ray) -> Self {
-        RayPacket::gather(&[*ray; LANES])
+        let (origin, dir) = (Vec3x8::splat(ray.origin), Vec3x8::splat(ray.dir));
+        RayPacket {
+            origin,
+            dir,
+            t_min: float8(ray.t_min),
+            t_max: float8(ray.t_max),
+            inv_dd: float8(1.0) / dir.dot(dir),
+        }
+    }
+
+    /// The ray of one lane in all lanes.
+    #[inline(always)]
+    pub fn broadcast(&self, i: usize) -> Self {
+        RayPacket {
+            origin: self.origin.broadcast(i),
+            dir: self.dir.broadcast(i),
+            t_min: self.t_min.broadcast(i),
+            t_max: self.t_max.broadcast(i),
+            inv_dd: self.inv_dd.broadcast(i),
+        }
     }
 
     /// The ray of one lane.
     pub fn lane(&self, i: usize) -> Ray {
         let (t_min, t_max) = (self.t_min.to_array()[i], self.t_max.to_array()[i]);
         Ray { origin: self.origin.lane(i), t_min, dir: self.dir.lane(i), t_max }
+    }
+
+    /// Origins and directions, those of a live ray in dead lanes.
+    pub fn filled(&self) -> (Vec3x8, Vec3x8) {
+        let live = self.live();
+        let one = live.bits().trailing_zeros() as usize % LANES;
+        let fill = |lanes: Vec3x8| Vec3x8::select(live, lanes, lanes.broadcast(one));
+        (fill(self.origin), fill(self.dir))
     }
 
     /// Lanes in which a hit at `t` lies on the ray.

@@ -104,6 +104,12 @@ impl Vec3x8 {
         Vec3x8::new(self.x.abs(), self.y.abs(), self.z.abs())
     }
 
+    /// Sum of the coordinates: of absolute values the 1-norm.
+    #[inline(always)]
+    pub fn sum(self) -> Float8 {
+        (self.x + self.y) + self.z
+    }
+
     /// Per lane `yes` or `no`.
     #[inline(always)]
     pub fn select(mask: Mask8, yes: Vec3x8, no: Vec3x8) -> Vec3x8 {

@@ -65,7 +65,7 @@ impl Kind {
 }
 
 /// Which primitive a part belongs to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Owner {
     /// Index of the primitive in the scene.
     pub primitive: u32,

@@ -42,7 +42,7 @@ fn columns(index: usize, cloud: &Cloud) -> Result<(), InvalidScene> {
         CloudShapes::Polygons { corners, starts } => {
             starts.is_sorted() && starts.last().is_none_or(|last| *last as usize <= corners.len())
         }
-        CloudShapes::Spheres(_) | CloudShapes::Disks(_) | CloudShapes::Boxes(..) => true,
+        CloudShapes::Spheres(_) | CloudShapes::Disks(_) | CloudShapes::Boxes(..) | CloudShapes::Cylinders(..) => true,
     };
     require(materials && colors && starts, || format!("the columns of cloud {index} do not fit each other"))
 }

@@ -1,5 +1,7 @@
 //! The unit of scheduling: a small square of pixels, all of their samples.
 
+use std::ops::Range;
+
 use crate::accel::PACKETS;
 use crate::film::{Picture, Window};
 use crate::integrate::{CameraRays, Direct, RayKind, Record, Room, Samples, Samples8, Wave};
@@ -66,8 +68,9 @@ impl Block {
             let (x, y) = (window.x0 + compact(code), window.y0 + compact(code >> 1));
             let Some(index) = window.index(x, y) else { continue };
             let pattern = rays.pattern(x, y);
-            for sample in 0..spp {
-                pending.push((x, y, pattern, sample), index);
+            let mut sample = 0;
+            while sample < spp {
+                sample = pending.push((x, y), pattern, sample..spp, index);
                 if pending.count == PACKETS * LANES {
                     flush(&mut pending, &mut room);
                 }
@@ -100,13 +103,17 @@ struct Pending {
 }
 
 impl Pending {
+    /// Adds samples of a pixel as far as their packet has room: the first one that is left.
     #[inline(always)]
-    fn push(&mut self, sample: (i32, i32, Pattern, u32), pixel: usize) {
-        let (p, i) = (self.count / LANES, self.count % LANES);
-        let samples = &mut self.samples[p];
-        (samples.x[i], samples.y[i], samples.pattern[i], samples.index[i]) = sample;
-        self.pixels[p][i] = pixel as u32;
-        self.count += 1;
+    fn push(&mut self, place: (i32, i32), pattern: Pattern, samples: Range<u32>, pixel: usize) -> u32 {
+        let (p, lane) = (self.count / LANES, self.count % LANES);
+        let count = LANES.min(lane + samples.len()) - lane;
+        for (lane, sample) in (lane..lane + count).zip(samples.start..) {
+            self.samples[p].set(lane, place, pattern, sample);
+            self.pixels[p][lane] = pixel as u32;
+        }
+        self.count += count;
+        samples.start + count as u32
     }
 
     fn clear(&mut self) {

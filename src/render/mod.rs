@@ -13,7 +13,7 @@ use glam::DVec3;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-pub use self::query::Query;
+pub use self::query::{Answers, Batch, Query};
 pub use self::stats::Stats;
 
 use self::block::{Block, BlockWork};

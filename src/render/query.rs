@@ -5,14 +5,15 @@ use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::{Engine, RenderError, pool};
+use crate::accel::Counts;
 use crate::lanes::{Ray, UNIT_ROUNDOFF};
 use crate::plan::validate;
 use crate::reference::{self, Reference};
 use crate::scene::Scene;
-use crate::tracer::{Hit, Tracer};
+use crate::tracer::{Found, Hit, RayBatch, TILE, Tracer};
 
-/// Rays a task: whole tiles, and work for some hundred microseconds.
-const CHUNK: usize = 4096;
+/// Tiles a task: work for some hundred microseconds.
+const CHUNK: usize = 64;
 
 /// A scene ready to be asked what rays meet, with threads of its own. Rays are in the coordinates of
 /// the scene; answers come in the order of the rays and do not depend on the number of threads.
@@ -25,9 +26,24 @@ pub struct Query<'s> {
 /// Who answers.
 #[derive(Debug)]
 enum Asked<'s> {
-    Packet(Tracer<'s>),
-    Single(Tracer<'s>),
+    Tracer(Box<Tracer<'s>>),
     Reference(Box<Reference>),
+}
+
+/// Rays in columns, ready to be traced again and again.
+#[derive(Debug)]
+pub struct Batch {
+    rays: Vec<Ray>,
+    columns: RayBatch,
+}
+
+/// What the rays of a batch met: place, primitive and normal.
+#[derive(Debug)]
+pub enum Answers {
+    /// In columns.
+    Tiles(Vec<Found>),
+    /// From the reference.
+    Reference(Vec<Option<Hit>>),
 }
 
 impl<'s> Query<'s> {
@@ -38,8 +54,8 @@ impl<'s> Query<'s> {
     pub fn new(scene: &'s Scene, engine: Engine, threads: usize) -> Result<Self, RenderError> {
         let pool = pool(threads)?;
         let asked = pool.install(|| match engine {
-            Engine::Packet => Tracer::new(scene).map(Asked::Packet),
-            Engine::Single => Tracer::new(scene).map(Asked::Single),
+            Engine::Packet => Tracer::new(scene).map(|tracer| Asked::Tracer(Box::new(tracer))),
+            Engine::Single => Tracer::new(scene).map(|tracer| Asked::Tracer(Box::new(tracer.one_by_one(true)))),
             Engine::Reference => validate(scene).map(|()| Asked::Reference(Box::new(Reference::new(scene)))),
         });
         let asked = asked?;
@@ -54,34 +70,100 @@ impl<'s> Query<'s> {
     /// The tracer behind it, unless that is the reference.
     pub fn tracer(&self) -> Option<&Tracer<'s>> {
         match &self.asked {
-            Asked::Packet(tracer) | Asked::Single(tracer) => Some(tracer),
+            Asked::Tracer(tracer) => Some(tracer),
             Asked::Reference(_) => None,
         }
     }
 
     /// What each ray meets first.
     pub fn closest(&self, rays: &[Ray]) -> Vec<Option<Hit>> {
-        self.each_chunk(rays, None, |rays| match &self.asked {
-            Asked::Packet(tracer) => tracer.closest_hits(rays),
-            Asked::Single(tracer) => rays.iter().map(|ray| tracer.closest_hit(ray)).collect(),
-            Asked::Reference(tracer) => rays.iter().map(|ray| tracer.closest(&exact(ray)).map(rounded)).collect(),
-        })
+        let batch = Batch::new(rays.to_vec());
+        let mut answers = self.room(&batch);
+        self.find_closest(&batch, &mut answers);
+        self.hits(&batch, answers)
     }
 
     /// Whether each ray meets anything, either side of it.
     pub fn occluded(&self, rays: &[Ray]) -> Vec<bool> {
-        self.each_chunk(rays, false, |rays| match &self.asked {
-            Asked::Packet(tracer) => tracer.occluded(rays),
-            Asked::Single(tracer) => rays.iter().map(|ray| tracer.is_occluded(ray)).collect(),
-            Asked::Reference(tracer) => rays.iter().map(|ray| tracer.occluded(&exact(ray))).collect(),
+        let batch = Batch::new(rays.to_vec());
+        let mut dark = vec![0; batch.tiles()];
+        self.find_occluded(&batch, &mut dark);
+        batch.unpack(&dark)
+    }
+
+    /// Room for what a batch meets.
+    pub fn room(&self, batch: &Batch) -> Answers {
+        match &self.asked {
+            Asked::Tracer(_) => Answers::Tiles(vec![Found::default(); batch.tiles()]),
+            Asked::Reference(_) => Answers::Reference(vec![None; batch.rays.len()]),
+        }
+    }
+
+    /// Finds what each ray of a batch meets first, and tells the tests that took (none by the reference).
+    pub fn find_closest(&self, batch: &Batch, answers: &mut Answers) -> Counts {
+        self.pool.install(|| match (&self.asked, answers) {
+            (Asked::Tracer(tracer), Answers::Tiles(found)) => {
+                let tasks = found.par_chunks_mut(CHUNK).enumerate();
+                let trace = |(i, found)| tracer.find_closest(&batch.columns, i * CHUNK, found);
+                tasks.map(trace).reduce(Counts::default, Counts::sum)
+            }
+            (Asked::Reference(reference), Answers::Reference(hits)) => {
+                let tasks = hits.par_iter_mut().zip(&batch.rays);
+                tasks.for_each(|(hit, ray)| *hit = reference.closest(&exact(ray)).map(rounded));
+                Counts::default()
+            }
+            _ => unreachable!("room of this query's own"),
         })
     }
 
-    fn each_chunk<T: Copy + Send>(&self, rays: &[Ray], none: T, trace: impl Fn(&[Ray]) -> Vec<T> + Sync) -> Vec<T> {
-        let mut answers = vec![none; rays.len()];
-        let tasks = answers.par_chunks_mut(CHUNK).zip(rays.par_chunks(CHUNK));
-        self.pool.install(|| tasks.for_each(|(answers, rays)| answers.copy_from_slice(&trace(rays))));
-        answers
+    /// Finds which rays of a batch meet anything, 64 a number, and tells the tests that took (none by the reference).
+    pub fn find_occluded(&self, batch: &Batch, dark: &mut [u64]) -> Counts {
+        self.pool.install(|| match &self.asked {
+            Asked::Tracer(tracer) => {
+                let tasks = dark.par_chunks_mut(CHUNK).enumerate();
+                let trace = |(i, dark)| tracer.find_occluded(&batch.columns, i * CHUNK, dark);
+                tasks.map(trace).reduce(Counts::default, Counts::sum)
+            }
+            Asked::Reference(reference) => {
+                let tasks = dark.par_iter_mut().zip(batch.rays.par_chunks(TILE));
+                let bit = |(i, ray): (usize, &Ray)| u64::from(reference.occluded(&exact(ray))) << i;
+                tasks.for_each(|(dark, rays)| *dark = rays.iter().enumerate().map(bit).sum());
+                Counts::default()
+            }
+        })
+    }
+
+    /// What was found, in full.
+    pub fn hits(&self, batch: &Batch, answers: Answers) -> Vec<Option<Hit>> {
+        match (&self.asked, answers) {
+            (Asked::Tracer(tracer), Answers::Tiles(found)) => self.pool.install(|| {
+                let tiles = found.par_iter().enumerate();
+                let mut hits: Vec<_> =
+                    tiles.flat_map_iter(|(i, found)| tracer.hits(&batch.columns, i, found)).collect();
+                hits.truncate(batch.rays.len());
+                hits
+            }),
+            (_, Answers::Reference(hits)) => hits,
+            _ => unreachable!("room of this query's own"),
+        }
+    }
+}
+
+impl Batch {
+    /// Turns rays into columns.
+    pub fn new(rays: Vec<Ray>) -> Self {
+        let columns = RayBatch::new(&rays);
+        Batch { rays, columns }
+    }
+
+    /// Tiles of 64 rays.
+    pub fn tiles(&self) -> usize {
+        self.columns.tiles()
+    }
+
+    /// The bits of [`Query::find_occluded`], one by one.
+    pub fn unpack(&self, dark: &[u64]) -> Vec<bool> {
+        (0..self.rays.len()).map(|i| dark[i / TILE] >> (i % TILE) & 1 == 1).collect()
     }
 }
 

@@ -1,16 +1,16 @@
 //! Every row asked, without a tree: what the tests hold kernels and walks against.
 
-use super::{Ray64, RowRef, Store, Stores, Visit};
+use super::{Hidden8, Part, Ray64, RowRef, Store, Stores, Visit};
 use crate::lanes::{Hit8, LANES, Ray, RayPacket};
 use crate::plan::Kind;
 use crate::scene::Visible;
 
-/// By row of a kind, what eight rays make of it: a lane a ray.
+/// By row of a kind, those of padding among them, what eight rays make of it: a lane a ray.
 pub fn packet_against_rows(stores: &Stores, kind: Kind, rays: &RayPacket, cull: bool) -> Vec<[Option<f32>; LANES]> {
     stores.visit(kind, ByRow { rays, cull })
 }
 
-/// By row of a kind, where one ray meets it: a lane a row.
+/// By row of a kind, those of padding among them, where one ray meets it: a lane a row.
 pub fn ray_against_rows(stores: &Stores, kind: Kind, ray: &Ray, cull: bool) -> Vec<Option<f32>> {
     stores.visit(kind, ByBlock { rays: RayPacket::splat(ray), cull })
 }
@@ -39,8 +39,12 @@ struct ByRow<'a> {
 
 impl Visit for ByRow<'_> {
     type Output = Vec<[Option<f32>; LANES]>;
-    fn visit<S: Store>(self, store: &S) -> Self::Output {
-        (0..store.parts().len()).map(|i| decided(store, &store.splat(i), self.rays, self.cull, |_| i)).collect()
+    fn visit<P: Part>(self, store: &Store<P>) -> Self::Output {
+        let row = |i: usize| {
+            let rows = store.splat(i);
+            decided(store, &rows, self.rays, self.cull, |_| i)
+        };
+        (0..store.blocks() * LANES).map(row).collect()
     }
 }
 
@@ -51,26 +55,29 @@ struct ByBlock {
 
 impl Visit for ByBlock {
     type Output = Vec<Option<f32>>;
-    fn visit<S: Store>(self, store: &S) -> Self::Output {
-        let count = store.parts().len();
-        let block = |first| decided(store, &store.block(first), &self.rays, self.cull, move |lane| first + lane);
-        let mut all: Vec<Option<f32>> = (0..count).step_by(LANES).flat_map(block).collect();
-        assert!(all[count..].iter().all(Option::is_none), "a padding row was hit");
-        all.truncate(count);
+    fn visit<P: Part>(self, store: &Store<P>) -> Self::Output {
+        let block = |b| decided(store, store.block(b), &self.rays, self.cull, move |lane| b * LANES + lane);
+        let all: Vec<Option<f32>> = (0..store.blocks()).flat_map(block).collect();
+        let padding = |row: &usize| store.part(*row).is_none();
+        assert!((0..all.len()).filter(padding).all(|row| all[row].is_none()), "a padding row was hit");
         all
     }
 }
 
 /// The kernel's answers, doubts decided.
-fn decided<S: Store>(
-    store: &S,
-    rows: &S::Row,
+fn decided<P: Part>(
+    store: &Store<P>,
+    rows: &P::Rows,
     rays: &RayPacket,
     cull: bool,
     row: impl Fn(usize) -> usize,
 ) -> [Option<f32>; LANES] {
-    let anchor = S::anchor(rows, &rays.origin);
-    let Hit8 { t, mask, doubt } = if cull { S::hit::<true>(&anchor, rays) } else { S::hit::<false>(&anchor, rays) };
+    let anchor = P::anchor(rows, &rays.origin, |lane| store.part(row(lane)));
+    let hidden = store.sides().lanes(&row);
+    let Hit8 { t, mask, doubt } = match cull {
+        true => P::hit::<true>(&anchor, rays, &hidden),
+        false => P::hit::<false>(&anchor, rays, &Hidden8::NONE),
+    };
     let lane = |lane: usize| {
         if doubt.bits() >> lane & 1 == 0 {
             return (mask.bits() >> lane & 1 == 1).then(|| t.to_array()[lane]);
@@ -80,7 +87,7 @@ fn decided<S: Store>(
         let (place, exact) = (t.to_array()[lane], Ray64::exact(&rays.lane(lane)));
         let keeps = mask.bits() >> lane & 1 == 1;
         let ray = if keeps { exact.endless() } else { exact };
-        S::decide(store.parts().get(i)?, &ray, visible).map(|t| if keeps { place } else { t as f32 })
+        store.part(i)?.decide(&ray, visible).map(|t| if keeps { place } else { t as f32 })
     };
     std::array::from_fn(lane)
 }

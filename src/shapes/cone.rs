@@ -4,33 +4,10 @@ use glam::{DVec2, DVec3};
 
 use super::cylinder::about_axis;
 use super::sphere::copysign;
-use super::{Hidden8, Ray64, Sides, Store, Surface8, Surface64, column_of, nearer, roundings};
-use crate::lanes::{Column, Column3, Float8, Hit8, LANES, Mask8, RayPacket, Vec3x8, difference_of_products, float8};
+use super::{Hidden8, Part, Ray64, Surface8, Surface64, nearer, roundings};
+use crate::lanes::{Float8, Hit8, Mask8, RayPacket, Vec3x8, difference_of_products, float8};
 use crate::plan::{ConePart, Owner};
 use crate::scene::Visible;
-
-/// All cones of a render.
-#[derive(Debug)]
-pub struct Cones {
-    tip: Column3,   // centre of the narrower end, scene units
-    axis: Column3,  // unit, from there to the wider end
-    height: Column, // scene units, > 0
-    radius: Column, // at the narrower end, scene units, >= 0
-    slope: Column,  // growth of the radius per unit of height, > 0
-    sides: Sides,
-    parts: Vec<ConePart>,
-}
-
-/// Eight rows.
-#[derive(Debug, Clone, Copy)]
-pub struct Row {
-    tip: Vec3x8,
-    axis: Vec3x8,
-    height: Float8,
-    radius: Float8,
-    slope: Float8,
-    hidden: Hidden8,
-}
 
 /// Eight rows seen from eight origins.
 #[derive(Debug, Clone, Copy)]
@@ -41,52 +18,24 @@ pub struct Anchor {
     height: Float8,
     radius: Float8,
     slope: Float8,
-    hidden: Hidden8,
 }
 
-impl Store for Cones {
-    type Part = ConePart;
-    type Row = Row;
+impl Part for ConePart {
+    /// Centre of the narrower end and the unit axis from there, height, radius there and growth per unit of height.
+    type Rows = ([Vec3x8; 2], [Float8; 3]);
     type Anchor = Anchor;
 
-    fn new(parts: Vec<ConePart>, sides: Sides) -> Self {
-        let tip = Column3::new(parts.iter().map(|part| part.narrow_end().0));
-        let axis = Column3::new(parts.iter().map(|part| part.narrow_end().1));
-        let height = column_of(&parts, |part| part.height);
-        let radius = column_of(&parts, |part| part.radius.min(part.apex_radius));
-        let slope = column_of(&parts, |part| part.slope().abs());
-        Cones { tip, axis, height, radius, slope, sides, parts }
-    }
-
-    fn parts(&self) -> &[ConePart] {
-        &self.parts
+    fn row(&self) -> ([DVec3; 2], [f64; 3]) {
+        let (tip, axis) = self.narrow_end();
+        ([tip, axis], [self.height, self.radius.min(self.apex_radius), self.slope().abs()])
     }
 
     #[inline(always)]
-    fn splat(&self, i: usize) -> Row {
-        let (tip, axis, height) = (self.tip.splat(i), self.axis.splat(i), self.height.splat(i));
-        Row { tip, axis, height, radius: self.radius.splat(i), slope: self.slope.splat(i), hidden: self.sides.splat(i) }
-    }
-
-    #[inline(always)]
-    fn block(&self, i: usize) -> Row {
-        let (tip, axis, height) = (self.tip.block(i), self.axis.block(i), self.height.block(i));
-        Row { tip, axis, height, radius: self.radius.block(i), slope: self.slope.block(i), hidden: self.sides.block(i) }
-    }
-
-    fn gather(&self, rows: [u32; LANES]) -> Row {
-        let hidden = self.sides.lanes(|lane| rows[lane] as usize);
-        let (tip, axis, height) = (self.tip.gather(rows), self.axis.gather(rows), self.height.gather(rows));
-        Row { tip, axis, height, radius: self.radius.gather(rows), slope: self.slope.gather(rows), hidden }
-    }
-
-    #[inline(always)]
-    fn anchor(row: &Row, origin: &Vec3x8) -> Anchor {
-        let Row { tip, axis, height, radius, slope, hidden } = *row;
+    fn anchor<'a>(rows: &Self::Rows, origin: &Vec3x8, _: impl Fn(usize) -> Option<&'a Self>) -> Anchor {
+        let ([tip, axis], [height, radius, slope]) = *rows;
         let f = tip - *origin;
-        let reach = tip.abs() + f.abs();
-        let error = roundings(4.0) * (reach.x + reach.y + reach.z);
-        Anchor { f, error, axis, height, radius, slope, hidden }
+        let error = roundings(4.0) * (tip.abs() + f.abs()).sum();
+        Anchor { f, error, axis, height, radius, slope }
     }
 
     /// Points at height `w` and distance `rho` from the axis with `rho = radius + slope w`, a quadratic in
@@ -94,8 +43,8 @@ impl Store for Cones {
     /// quotient and product. Heights outside 0..height drop the mirror cone as well. Along the way the
     /// sign of `A t + B` says which side of the mantle a root meets.
     #[inline(always)]
-    fn hit<const CULL: bool>(anchor: &Anchor, rays: &RayPacket) -> Hit8 {
-        let Anchor { f, error, axis, height, radius, slope, hidden } = *anchor;
+    fn hit<const CULL: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
+        let Anchor { f, error, axis, height, radius, slope } = *anchor;
         let p = f.dot(rays.dir) * rays.inv_dd;
         let g = rays.dir.mul_add(p, -f); // from the tip to the nearest point
         let (gw, dw) = (g.dot(axis), rays.dir.dot(axis));
@@ -139,72 +88,62 @@ impl Store for Cones {
         Hit8 { t, mask: (ok1 | ok2) & !doubt, doubt }
     }
 
-    fn decide(part: &ConePart, ray: &Ray64, visible: Visible) -> Option<f64> {
-        let Quadratic { a, b, disc, mut roots } = Quadratic::new(part, ray);
+    fn decide(&self, ray: &Ray64, visible: Visible) -> Option<f64> {
+        let Quadratic { a, b, disc, mut roots } = Quadratic::new(self, ray);
         roots.sort_by(f64::total_cmp);
         let keep = |t: &f64| {
             let enters = a * t + b < 0.0;
             let shown = visible == Visible::Both || enters == (visible == Visible::Front);
-            let w = (ray.at(*t) - part.base).dot(part.axis);
-            shown && ray.accepts(*t) && (0.0..=part.height).contains(&w)
+            let w = (ray.at(*t) - self.base).dot(self.axis);
+            shown && ray.accepts(*t) && (0.0..=self.height).contains(&w)
         };
         roots.into_iter().find(keep).filter(|_| disc >= 0.0)
     }
 
-    fn refine(part: &ConePart, ray: &Ray64, t: f64) -> Surface64 {
-        let Quadratic { roots: [a, b], .. } = Quadratic::new(part, ray);
+    fn refine(&self, ray: &Ray64, t: f64) -> Surface64 {
+        let Quadratic { roots: [a, b], .. } = Quadratic::new(self, ray);
         let t = nearer(a, b, t);
-        let from_base = ray.at(t) - part.base;
-        let w = from_base.dot(part.axis);
+        let from_base = ray.at(t) - self.base;
+        let w = from_base.dot(self.axis);
         // At the tip there is no radial direction; the way out along the axis stands in for it.
-        let radial = (from_base - part.axis * w).try_normalize();
-        let normal = (radial.unwrap_or(-part.narrow_end().1) - part.axis * part.slope()).normalize();
-        let rho = (part.radius + part.slope() * w).max(0.0);
-        Surface64 { t, point: part.base + part.axis * w + radial.unwrap_or_default() * rho, normal }
+        let radial = (from_base - self.axis * w).try_normalize();
+        let normal = (radial.unwrap_or(-self.narrow_end().1) - self.axis * self.slope()).normalize();
+        let rho = (self.radius + self.slope() * w).max(0.0);
+        Surface64 { t, point: self.base + self.axis * w + radial.unwrap_or_default() * rho, normal }
     }
 
-    fn surface(row: &Row, rays: &RayPacket, t: Float8) -> Surface8 {
-        let f = row.tip - rays.origin;
+    fn surface(rows: &Self::Rows, rays: &RayPacket, t: Float8) -> Surface8 {
+        let ([tip, axis], [height, radius, slope]) = *rows;
+        let f = tip - rays.origin;
         let p = f.dot(rays.dir) * rays.inv_dd;
         let from_tip = rays.dir.mul_add(t - p, rays.dir.mul_add(p, -f));
-        let w = from_tip.dot(row.axis);
-        let radial = row.axis.mul_add(-w, from_tip);
+        let w = from_tip.dot(axis);
+        let radial = axis.mul_add(-w, from_tip);
         let length = radial.length();
         // At the tip there is no radial direction; the way out along the axis stands in for it.
         let at_tip = !Mask8::gt(length, Float8::ZERO);
-        let radial = Vec3x8::select(at_tip, -row.axis, radial * (float8(1.0) / length));
-        let normal = row.axis.mul_add(-row.slope, radial).normalize();
-        let rho = row.slope.mul_add(w, row.radius).fast_max(Float8::ZERO);
-        let point = radial.mul_add(at_tip.select(Float8::ZERO, rho), row.axis.mul_add(w, row.tip));
-        let reach = row.tip.abs();
-        let size = row.height + row.radius + rho;
-        let error = roundings(6.0) * (reach.x + reach.y + reach.z + size);
+        let radial = Vec3x8::select(at_tip, -axis, radial * (float8(1.0) / length));
+        let normal = axis.mul_add(-slope, radial).normalize();
+        let rho = slope.mul_add(w, radius).fast_max(Float8::ZERO);
+        let point = radial.mul_add(at_tip.select(Float8::ZERO, rho), axis.mul_add(w, tip));
+        let error = roundings(6.0) * (tip.abs().sum() + height + radius + rho);
         Surface8 { point, normal, error }
     }
 
-    fn uv(part: &ConePart, point: DVec3) -> DVec2 {
-        about_axis(point - part.base, part.axis, part.height)
+    fn uv(&self, point: DVec3) -> DVec2 {
+        about_axis(point - self.base, self.axis, self.height)
     }
 
-    fn bounds(part: &ConePart) -> (DVec3, DVec3) {
-        let a = part.axis;
+    fn bounds(&self) -> (DVec3, DVec3) {
+        let a = self.axis;
         let half = DVec3::new(a.y.hypot(a.z), a.z.hypot(a.x), a.x.hypot(a.y));
-        let apex = part.base + a * part.height;
-        let (low, high) = (half * part.radius, half * part.apex_radius);
-        ((part.base - low).min(apex - high), (part.base + low).max(apex + high))
+        let apex = self.base + a * self.height;
+        let (low, high) = (half * self.radius, half * self.apex_radius);
+        ((self.base - low).min(apex - high), (self.base + low).max(apex + high))
     }
 
-    fn owner(part: &ConePart) -> Owner {
-        part.owner
-    }
-
-    fn sides(&self) -> &Sides {
-        &self.sides
-    }
-
-    fn column_bytes(&self) -> usize {
-        let scalars = [&self.height, &self.radius, &self.slope];
-        self.tip.bytes() + self.axis.bytes() + scalars.iter().map(|column| column.bytes()).sum::<usize>()
+    fn owner(&self) -> Owner {
+        self.owner
     }
 }
 

@@ -2,114 +2,67 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{Hidden8, Ray64, Sides, Store, Surface8, Surface64, nearer, roundings};
-use crate::lanes::{Column3, Float8, Hit8, LANES, Mask8, RayPacket, Vec3x8, float8};
+use super::{Hidden8, Part, Ray64, Surface8, Surface64, nearer, roundings};
+use crate::lanes::{Float8, Hit8, Mask8, RayPacket, Vec3x8, float8};
 use crate::plan::{BoxPart, Owner};
 use crate::scene::Visible;
-
-/// All axis-aligned boxes of a render.
-#[derive(Debug)]
-pub struct Boxes {
-    min: Column3, // scene units
-    max: Column3, // scene units, above `min`
-    sides: Sides,
-    parts: Vec<BoxPart>,
-}
-
-/// Eight rows.
-#[derive(Debug, Clone, Copy)]
-pub struct Row {
-    min: Vec3x8,
-    max: Vec3x8,
-    hidden: Hidden8,
-}
 
 /// Eight rows seen from eight origins.
 #[derive(Debug, Clone, Copy)]
 pub struct Anchor {
     min: Vec3x8,
     max: Vec3x8,
-    hidden: Hidden8,
 }
 
-impl Store for Boxes {
-    type Part = BoxPart;
-    type Row = Row;
+impl Part for BoxPart {
+    /// Lower and upper corner.
+    type Rows = [Vec3x8; 2];
     type Anchor = Anchor;
 
-    fn new(parts: Vec<BoxPart>, sides: Sides) -> Self {
-        let min = Column3::new(parts.iter().map(|part| part.min));
-        let max = Column3::new(parts.iter().map(|part| part.max));
-        Boxes { min, max, sides, parts }
-    }
-
-    fn parts(&self) -> &[BoxPart] {
-        &self.parts
+    fn row(&self) -> [DVec3; 2] {
+        [self.min, self.max]
     }
 
     #[inline(always)]
-    fn splat(&self, i: usize) -> Row {
-        Row { min: self.min.splat(i), max: self.max.splat(i), hidden: self.sides.splat(i) }
+    fn anchor<'a>(rows: &Self::Rows, origin: &Vec3x8, _: impl Fn(usize) -> Option<&'a Self>) -> Anchor {
+        Anchor { min: rows[0] - *origin, max: rows[1] - *origin }
     }
 
     #[inline(always)]
-    fn block(&self, first: usize) -> Row {
-        Row { min: self.min.block(first), max: self.max.block(first), hidden: self.sides.block(first) }
-    }
-
-    fn gather(&self, rows: [u32; LANES]) -> Row {
-        let hidden = self.sides.lanes(|lane| rows[lane] as usize);
-        Row { min: self.min.gather(rows), max: self.max.gather(rows), hidden }
-    }
-
-    #[inline(always)]
-    fn anchor(row: &Row, origin: &Vec3x8) -> Anchor {
-        Anchor { min: row.min - *origin, max: row.max - *origin, hidden: row.hidden }
-    }
-
-    #[inline(always)]
-    fn hit<const CULL: bool>(anchor: &Anchor, rays: &RayPacket) -> Hit8 {
+    fn hit<const CULL: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
         let (entry, exit) = slabs(anchor.min, anchor.max, rays.dir);
-        first_of::<CULL>(entry, exit, &anchor.hidden, rays)
+        first_of::<CULL>(entry, exit, hidden, rays)
     }
 
-    fn decide(part: &BoxPart, ray: &Ray64, visible: Visible) -> Option<f64> {
-        let (entry, exit) = slabs64(part.min - ray.origin, part.max - ray.origin, ray.dir);
+    fn decide(&self, ray: &Ray64, visible: Visible) -> Option<f64> {
+        let (entry, exit) = slabs64(self.min - ray.origin, self.max - ray.origin, ray.dir);
         (entry <= exit).then(|| ray.first(entry, exit, visible)).flatten()
     }
 
-    fn refine(part: &BoxPart, ray: &Ray64, t: f64) -> Surface64 {
-        let (entry, exit) = slabs64(part.min - ray.origin, part.max - ray.origin, ray.dir);
+    fn refine(&self, ray: &Ray64, t: f64) -> Surface64 {
+        let (entry, exit) = slabs64(self.min - ray.origin, self.max - ray.origin, ray.dir);
         let t = nearer(entry, exit, t);
-        let (point, normal) = face64(part.min, part.max, ray.at(t));
+        let (point, normal) = face64(self.min, self.max, ray.at(t));
         Surface64 { t, point, normal }
     }
 
     #[inline(always)]
-    fn surface(row: &Row, rays: &RayPacket, t: Float8) -> Surface8 {
-        let (point, normal) = face(row.min, row.max, rays.dir.mul_add(t, rays.origin));
-        let reach = point.abs() + (row.min.abs() + row.max.abs());
+    fn surface([min, max]: &[Vec3x8; 2], rays: &RayPacket, t: Float8) -> Surface8 {
+        let (point, normal) = face(*min, *max, rays.dir.mul_add(t, rays.origin));
+        let reach = point.abs() + (min.abs() + max.abs());
         Surface8 { point, normal, error: roundings(2.0) * normal.abs().dot(reach) }
     }
 
-    fn uv(part: &BoxPart, point: DVec3) -> DVec2 {
-        face_uv(part.min, part.max, point)
+    fn uv(&self, point: DVec3) -> DVec2 {
+        face_uv(self.min, self.max, point)
     }
 
-    fn bounds(part: &BoxPart) -> (DVec3, DVec3) {
-        (part.min, part.max)
+    fn bounds(&self) -> (DVec3, DVec3) {
+        (self.min, self.max)
     }
 
-    fn owner(part: &BoxPart) -> Owner {
-        part.owner
-    }
-
-    fn sides(&self) -> &Sides {
-        &self.sides
-    }
-
-    fn column_bytes(&self) -> usize {
-        self.min.bytes() + self.max.bytes()
+    fn owner(&self) -> Owner {
+        self.owner
     }
 }
 

@@ -5,31 +5,10 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 
 use super::sphere::copysign;
-use super::{Hidden8, Ray64, Sides, Store, Surface8, Surface64, column_of, nearer, roundings};
-use crate::lanes::{Column, Column3, Float8, Hit8, LANES, Mask8, RayPacket, Vec3x8, float8};
+use super::{Hidden8, Part, Ray64, Surface8, Surface64, nearer, roundings};
+use crate::lanes::{Float8, Hit8, Mask8, RayPacket, Vec3x8, float8};
 use crate::plan::{CylinderPart, Owner};
 use crate::scene::{Visible, basis};
-
-/// All cylinders of a render.
-#[derive(Debug)]
-pub struct Cylinders {
-    base: Column3,  // scene units
-    axis: Column3,  // unit, from base to apex
-    height: Column, // scene units, > 0
-    radius: Column, // scene units, > 0
-    sides: Sides,
-    parts: Vec<CylinderPart>,
-}
-
-/// Eight rows.
-#[derive(Debug, Clone, Copy)]
-pub struct Row {
-    base: Vec3x8,
-    axis: Vec3x8,
-    height: Float8,
-    radius: Float8,
-    hidden: Hidden8,
-}
 
 /// Eight rows seen from eight origins.
 #[derive(Debug, Clone, Copy)]
@@ -40,52 +19,25 @@ pub struct Anchor {
     r2: Float8,
     error: Float8, // of f, the rounding of the scene included
     bound: Float8, // of the slack below
-    hidden: Hidden8,
 }
 
-impl Store for Cylinders {
-    type Part = CylinderPart;
-    type Row = Row;
+impl Part for CylinderPart {
+    /// Base and unit axis, height and radius.
+    type Rows = ([Vec3x8; 2], [Float8; 2]);
     type Anchor = Anchor;
 
-    fn new(parts: Vec<CylinderPart>, sides: Sides) -> Self {
-        let base = Column3::new(parts.iter().map(|part| part.base));
-        let axis = Column3::new(parts.iter().map(|part| part.axis));
-        let height = column_of(&parts, |part| part.height);
-        let radius = column_of(&parts, |part| part.radius);
-        Cylinders { base, axis, height, radius, sides, parts }
-    }
-
-    fn parts(&self) -> &[CylinderPart] {
-        &self.parts
+    fn row(&self) -> ([DVec3; 2], [f64; 2]) {
+        ([self.base, self.axis], [self.height, self.radius])
     }
 
     #[inline(always)]
-    fn splat(&self, i: usize) -> Row {
-        let (base, axis) = (self.base.splat(i), self.axis.splat(i));
-        Row { base, axis, height: self.height.splat(i), radius: self.radius.splat(i), hidden: self.sides.splat(i) }
-    }
-
-    #[inline(always)]
-    fn block(&self, i: usize) -> Row {
-        let (base, axis) = (self.base.block(i), self.axis.block(i));
-        Row { base, axis, height: self.height.block(i), radius: self.radius.block(i), hidden: self.sides.block(i) }
-    }
-
-    fn gather(&self, rows: [u32; LANES]) -> Row {
-        let hidden = self.sides.lanes(|lane| rows[lane] as usize);
-        let (base, axis) = (self.base.gather(rows), self.axis.gather(rows));
-        Row { base, axis, height: self.height.gather(rows), radius: self.radius.gather(rows), hidden }
-    }
-
-    #[inline(always)]
-    fn anchor(row: &Row, origin: &Vec3x8) -> Anchor {
-        let f = row.base - *origin;
-        let reach = row.base.abs() + f.abs();
-        let error = roundings(6.0) * (reach.x + reach.y + reach.z + row.height);
-        let r2 = row.radius * row.radius;
-        let bound = (row.radius + row.radius).mul_add(error, error * error) + roundings(24.0) * r2;
-        Anchor { f, axis: row.axis, height: row.height, r2, error, bound, hidden: row.hidden }
+    fn anchor<'a>(rows: &Self::Rows, origin: &Vec3x8, _: impl Fn(usize) -> Option<&'a Self>) -> Anchor {
+        let ([base, axis], [height, radius]) = *rows;
+        let f = base - *origin;
+        let error = roundings(6.0) * ((base.abs() + f.abs()).sum() + height);
+        let r2 = radius * radius;
+        let bound = (radius + radius).mul_add(error, error * error) + roundings(24.0) * r2;
+        Anchor { f, axis, height, r2, error, bound }
     }
 
     /// The sphere's test in the plane across the axis, from the ray's point nearest the base, where the
@@ -93,8 +45,8 @@ impl Store for Cylinders {
     ///
     /// Source: after Haines, Günther and Akenine-Möller, Ray Tracing Gems, 2019, chapter 7.
     #[inline(always)]
-    fn hit<const CULL: bool>(anchor: &Anchor, rays: &RayPacket) -> Hit8 {
-        let Anchor { f, axis, height, r2, error, bound, hidden } = *anchor;
+    fn hit<const CULL: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
+        let Anchor { f, axis, height, r2, error, bound } = *anchor;
         let p = f.dot(rays.dir) * rays.inv_dd;
         let q = rays.dir.mul_add(-p, f);
         let (da, qa) = (rays.dir.dot(axis), q.dot(axis));
@@ -131,60 +83,51 @@ impl Store for Cylinders {
         Hit8 { t: entry_ok.select(p + entry, p + exit), mask: (entry_ok | exit_ok) & !doubt, doubt }
     }
 
-    fn decide(part: &CylinderPart, ray: &Ray64, visible: Visible) -> Option<f64> {
-        let (disc, [a, b]) = roots(part, ray);
+    fn decide(&self, ray: &Ray64, visible: Visible) -> Option<f64> {
+        let (disc, [a, b]) = roots(self, ray);
         let keep = |t: &f64| {
-            let w = (ray.at(*t) - part.base).dot(part.axis);
-            (0.0..=part.height).contains(&w) && ray.accepts(*t)
+            let w = (ray.at(*t) - self.base).dot(self.axis);
+            (0.0..=self.height).contains(&w) && ray.accepts(*t)
         };
         let entry = Some(a.min(b)).filter(keep).filter(|_| visible != Visible::Back);
         let first = entry.or_else(|| Some(a.max(b)).filter(keep).filter(|_| visible != Visible::Front));
         first.filter(|_| disc >= 0.0)
     }
 
-    fn refine(part: &CylinderPart, ray: &Ray64, t: f64) -> Surface64 {
-        let (_, [a, b]) = roots(part, ray);
+    fn refine(&self, ray: &Ray64, t: f64) -> Surface64 {
+        let (_, [a, b]) = roots(self, ray);
         let t = nearer(a, b, t);
-        let from_base = ray.at(t) - part.base;
-        let w = from_base.dot(part.axis);
-        let normal = (from_base - part.axis * w).normalize();
-        Surface64 { t, point: part.base + part.axis * w + normal * part.radius, normal }
+        let from_base = ray.at(t) - self.base;
+        let w = from_base.dot(self.axis);
+        let normal = (from_base - self.axis * w).normalize();
+        Surface64 { t, point: self.base + self.axis * w + normal * self.radius, normal }
     }
 
-    fn surface(row: &Row, rays: &RayPacket, t: Float8) -> Surface8 {
-        let f = row.base - rays.origin;
+    fn surface(rows: &Self::Rows, rays: &RayPacket, t: Float8) -> Surface8 {
+        let ([base, axis], [height, radius]) = *rows;
+        let f = base - rays.origin;
         let p = f.dot(rays.dir) * rays.inv_dd;
         let from_base = rays.dir.mul_add(t - p, rays.dir.mul_add(p, -f));
-        let w = from_base.dot(row.axis);
-        let normal = row.axis.mul_add(-w, from_base).normalize();
-        let point = normal.mul_add(row.radius, row.axis.mul_add(w, row.base));
-        let reach = row.base.abs();
-        let size = row.height + row.radius;
-        let error = roundings(6.0) * (reach.x + reach.y + reach.z + size);
+        let w = from_base.dot(axis);
+        let normal = axis.mul_add(-w, from_base).normalize();
+        let point = normal.mul_add(radius, axis.mul_add(w, base));
+        let error = roundings(6.0) * (base.abs().sum() + height + radius);
         Surface8 { point, normal, error }
     }
 
-    fn uv(part: &CylinderPart, point: DVec3) -> DVec2 {
-        about_axis(point - part.base, part.axis, part.height)
+    fn uv(&self, point: DVec3) -> DVec2 {
+        about_axis(point - self.base, self.axis, self.height)
     }
 
-    fn bounds(part: &CylinderPart) -> (DVec3, DVec3) {
-        let a = part.axis;
-        let half = DVec3::new(a.y.hypot(a.z), a.z.hypot(a.x), a.x.hypot(a.y)) * part.radius;
-        let apex = part.base + a * part.height;
-        (part.base.min(apex) - half, part.base.max(apex) + half)
+    fn bounds(&self) -> (DVec3, DVec3) {
+        let a = self.axis;
+        let half = DVec3::new(a.y.hypot(a.z), a.z.hypot(a.x), a.x.hypot(a.y)) * self.radius;
+        let apex = self.base + a * self.height;
+        (self.base.min(apex) - half, self.base.max(apex) + half)
     }
 
-    fn owner(part: &CylinderPart) -> Owner {
-        part.owner
-    }
-
-    fn sides(&self) -> &Sides {
-        &self.sides
-    }
-
-    fn column_bytes(&self) -> usize {
-        self.base.bytes() + self.axis.bytes() + self.height.bytes() + self.radius.bytes()
+    fn owner(&self) -> Owner {
+        self.owner
     }
 }
 

@@ -4,7 +4,7 @@
 //! rays against one primitive and one ray against eight primitives run the same lines and give the
 //! same bits. What depends on the ray's origin and the primitive alone is an *anchor*, made once for
 //! all rays that share an origin. Where a kernel cannot tell hit from miss it says so, and the pair is
-//! decided in f64 from the scene's own numbers ([`Store::decide`]).
+//! decided in f64 from the scene's own numbers ([`Part::decide`]).
 
 #[cfg(test)]
 pub(crate) mod brute;
@@ -15,6 +15,7 @@ mod disk;
 mod plane;
 mod polygon;
 mod sphere;
+mod store;
 mod stores;
 #[cfg(test)]
 mod tests;
@@ -22,59 +23,40 @@ mod turned;
 
 use glam::{DVec2, DVec3};
 
-pub use self::cone::Cones;
-pub use self::cuboid::Boxes;
-pub use self::cylinder::Cylinders;
-pub use self::disk::Disks;
-pub use self::plane::Planes;
-pub use self::polygon::Polygons;
-pub use self::sphere::Spheres;
-pub use self::stores::{RowRef, Stores, Visit};
-pub use self::turned::TurnedBoxes;
+pub use self::store::{Hidden8, Store};
+pub use self::stores::{Groups, RowRef, Stores, Visit};
 
-use crate::lanes::{Column, Float8, Hit8, LANES, Mask8, Ray, RayPacket, Vec3x8, float8};
+use crate::lanes::{Columns, Float8, Hit8, Mask8, Ray, RayPacket, Vec3x8, float8};
 use crate::plan::Owner;
 use crate::scene::Visible;
 
-/// All primitives of one kind, structure of arrays: primitive `i` is row `i` of every column.
-pub trait Store: Sized + Sync {
-    /// One primitive in f64, relative to the plan's origin.
-    type Part: Clone + Send + Sync;
-    /// Eight rows of all columns.
-    type Row: Copy;
+/// A kind of part: its columns, its kernel, and the same in f64.
+pub trait Part: Clone + Send + Sync {
+    /// Eight parts as kernels see them.
+    type Rows: Columns;
     /// What depends on the origin of a ray and the primitive alone.
     type Anchor: Copy;
 
-    /// Stores the parts in this order.
-    fn new(parts: Vec<Self::Part>, sides: Sides) -> Self;
-    /// The parts, in the order of the rows.
-    fn parts(&self) -> &[Self::Part];
-    /// Row `i` in all lanes.
-    fn splat(&self, i: usize) -> Self::Row;
-    /// Rows `first..first + 8`, a lane each; rows past the last one cannot be hit.
-    fn block(&self, first: usize) -> Self::Row;
-    /// Lane `k` is row `rows[k]`.
-    fn gather(&self, rows: [u32; LANES]) -> Self::Row;
-    /// What the kernel needs of these rows for rays from `origin`.
-    fn anchor(row: &Self::Row, origin: &Vec3x8) -> Self::Anchor;
+    /// The numbers of one part, to be rounded.
+    fn row(&self) -> <Self::Rows as Columns>::One;
+    /// What the kernel needs of these rows for rays from `origin`; `part` tells what a lane of `rows` stands for.
+    fn anchor<'a>(rows: &Self::Rows, origin: &Vec3x8, part: impl Fn(usize) -> Option<&'a Self>) -> Self::Anchor
+    where
+        Self: 'a;
     /// First hit with `t_min < t <= t_max`; with `CULL` hidden sides are not met.
-    fn hit<const CULL: bool>(anchor: &Self::Anchor, rays: &RayPacket) -> Hit8;
+    fn hit<const CULL: bool>(anchor: &Self::Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8;
     /// The f64 answer where the kernel is in doubt: touching counts as a hit.
-    fn decide(part: &Self::Part, ray: &Ray64, visible: Visible) -> Option<f64>;
+    fn decide(&self, ray: &Ray64, visible: Visible) -> Option<f64>;
     /// The hit near `t` again, in f64.
-    fn refine(part: &Self::Part, ray: &Ray64, t: f64) -> Surface64;
+    fn refine(&self, ray: &Ray64, t: f64) -> Surface64;
     /// Where the rays are at `t`, put on the surface.
-    fn surface(row: &Self::Row, rays: &RayPacket, t: Float8) -> Surface8;
-    /// Texture coordinates of one hit point on one part.
-    fn uv(part: &Self::Part, point: DVec3) -> DVec2;
-    /// Bounds of a part: lower and upper corner.
-    fn bounds(part: &Self::Part) -> (DVec3, DVec3);
+    fn surface(rows: &Self::Rows, rays: &RayPacket, t: Float8) -> Surface8;
+    /// Texture coordinates of a point on the part.
+    fn uv(&self, point: DVec3) -> DVec2;
+    /// Bounds: lower and upper corner.
+    fn bounds(&self) -> (DVec3, DVec3);
     /// Whose part it is.
-    fn owner(part: &Self::Part) -> Owner;
-    /// Which sides of the rows are seen.
-    fn sides(&self) -> &Sides;
-    /// Memory of the columns in bytes.
-    fn column_bytes(&self) -> usize;
+    fn owner(&self) -> Owner;
 }
 
 /// Eight hit points.
@@ -89,6 +71,8 @@ pub struct Surface8 {
 }
 
 impl Surface8 {
+    const NOTHING: Surface8 = Surface8 { point: Vec3x8::ZERO, normal: Vec3x8::ZERO, error: Float8::ZERO };
+
     /// With the lanes of `mask` from `other`.
     fn with(&self, mask: Mask8, other: &Surface8) -> Surface8 {
         Surface8 {
@@ -161,60 +145,8 @@ fn nearer(a: f64, b: f64, t: f64) -> f64 {
     if (a - t).abs() <= (b - t).abs() { a } else { b }
 }
 
-/// Which sides of each row are seen; nothing is stored where all rows show both.
-#[derive(Debug, Clone, Default)]
-pub struct Sides(Option<Vec<Visible>>);
-
-/// Hidden sides of eight rows.
-#[derive(Debug, Clone, Copy)]
-pub struct Hidden8 {
-    /// Lanes whose front is not met.
-    pub front: Mask8,
-    /// Lanes whose back is not met.
-    pub back: Mask8,
-}
-
-impl Sides {
-    /// One entry a row.
-    pub fn new(rows: Vec<Visible>) -> Self {
-        Sides(rows.iter().any(|side| *side != Visible::Both).then_some(rows))
-    }
-
-    /// Whether any row hides a side.
-    pub fn hide_any(&self) -> bool {
-        self.0.is_some()
-    }
-
-    /// What row `i` shows.
-    pub fn row(&self, i: usize) -> Visible {
-        self.0.as_ref().map_or(Visible::Both, |rows| rows[i])
-    }
-
-    #[inline(always)]
-    fn splat(&self, i: usize) -> Hidden8 {
-        self.lanes(|_| i)
-    }
-
-    #[inline(always)]
-    fn block(&self, first: usize) -> Hidden8 {
-        self.lanes(|lane| first + lane)
-    }
-
-    #[inline(always)]
-    fn lanes(&self, row: impl Fn(usize) -> usize) -> Hidden8 {
-        let Some(rows) = &self.0 else { return Hidden8 { front: Mask8::NONE, back: Mask8::NONE } };
-        let bits = |side| (0..LANES).map(|lane| u32::from(rows.get(row(lane)) == Some(&side)) << lane).sum();
-        Hidden8 { front: Mask8::from_bits(bits(Visible::Back)), back: Mask8::from_bits(bits(Visible::Front)) }
-    }
-}
-
 /// The half-width of a decision's doubt, in units of [`UNIT_ROUNDOFF`](crate::lanes::UNIT_ROUNDOFF) of its terms.
 #[inline(always)]
 fn roundings(n: f32) -> Float8 {
     float8(n * crate::lanes::UNIT_ROUNDOFF)
-}
-
-/// Unit normals of parts, rounded to f32.
-fn column_of<P>(parts: &[P], f: impl Fn(&P) -> f64) -> Column {
-    Column::new(parts.iter().map(f))
 }

@@ -2,67 +2,30 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{Hidden8, Ray64, Sides, Store, Surface8, Surface64, roundings};
-use crate::lanes::{Column3, Float8, Hit8, LANES, Mask8, RayPacket, Vec3x8};
+use super::{Hidden8, Part, Ray64, Surface8, Surface64, roundings};
+use crate::lanes::{Float8, Hit8, Mask8, RayPacket, Vec3x8};
 use crate::plan::{Owner, PlanePart};
 use crate::scene::{Visible, basis};
-
-/// All planes of a render.
-#[derive(Debug)]
-pub struct Planes {
-    point: Column3,  // scene units
-    normal: Column3, // unit
-    sides: Sides,
-    parts: Vec<PlanePart>,
-}
-
-/// Eight rows.
-#[derive(Debug, Clone, Copy)]
-pub struct Row {
-    point: Vec3x8,
-    normal: Vec3x8,
-    hidden: Hidden8,
-}
 
 /// Eight rows seen from eight origins.
 #[derive(Debug, Clone, Copy)]
 pub struct Anchor {
     height: Float8, // n . (point - origin)
     normal: Vec3x8,
-    hidden: Hidden8,
 }
 
-impl Store for Planes {
-    type Part = PlanePart;
-    type Row = Row;
+impl Part for PlanePart {
+    /// A point and the unit normal.
+    type Rows = [Vec3x8; 2];
     type Anchor = Anchor;
 
-    fn new(parts: Vec<PlanePart>, sides: Sides) -> Self {
-        let point = Column3::new(parts.iter().map(|part| part.point));
-        let normal = Column3::new(parts.iter().map(|part| part.normal));
-        Planes { point, normal, sides, parts }
+    fn row(&self) -> [DVec3; 2] {
+        [self.point, self.normal]
     }
 
-    fn parts(&self) -> &[PlanePart] {
-        &self.parts
-    }
-
-    fn splat(&self, i: usize) -> Row {
-        Row { point: self.point.splat(i), normal: self.normal.splat(i), hidden: self.sides.splat(i) }
-    }
-
-    fn block(&self, first: usize) -> Row {
-        Row { point: self.point.block(first), normal: self.normal.block(first), hidden: self.sides.block(first) }
-    }
-
-    fn gather(&self, rows: [u32; LANES]) -> Row {
-        let hidden = self.sides.lanes(|lane| rows[lane] as usize);
-        Row { point: self.point.gather(rows), normal: self.normal.gather(rows), hidden }
-    }
-
-    fn anchor(row: &Row, origin: &Vec3x8) -> Anchor {
-        let height = row.normal.dot(row.point - *origin);
-        Anchor { height, normal: row.normal, hidden: row.hidden }
+    fn anchor<'a>(rows: &Self::Rows, origin: &Vec3x8, _: impl Fn(usize) -> Option<&'a Self>) -> Anchor {
+        let [point, normal] = *rows;
+        Anchor { height: normal.dot(point - *origin), normal }
     }
 
     /// `t = n . (point - origin) / n . dir`: equation (6) of the paper with its sign put right. A ray in
@@ -71,51 +34,43 @@ impl Store for Planes {
     /// Source: Kucherov, Morgun and Golenkovskaya, "A visualization of 3D images by back ray tracing:
     /// the geometric approach", 2016, section IV A.
     #[inline(always)]
-    fn hit<const CULL: bool>(anchor: &Anchor, rays: &RayPacket) -> Hit8 {
+    fn hit<const CULL: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
         let nd = anchor.normal.dot(rays.dir);
         let t = anchor.height / nd;
         let mut mask = rays.accepts(t) & Mask8::lt(t, Float8::splat(f32::INFINITY));
         if CULL {
-            mask &= !side_hidden(nd, &anchor.hidden);
+            mask &= !side_hidden(nd, hidden);
         }
         Hit8 { t, mask, doubt: Mask8::NONE }
     }
 
-    fn decide(part: &PlanePart, ray: &Ray64, visible: Visible) -> Option<f64> {
-        let nd = part.normal.dot(ray.dir);
-        let t = part.normal.dot(part.point - ray.origin) / nd;
+    fn decide(&self, ray: &Ray64, visible: Visible) -> Option<f64> {
+        let nd = self.normal.dot(ray.dir);
+        let t = self.normal.dot(self.point - ray.origin) / nd;
         (t.is_finite() && ray.accepts(t) && shows(nd, visible)).then_some(t)
     }
 
-    fn refine(part: &PlanePart, ray: &Ray64, _: f64) -> Surface64 {
-        flat_surface64(part.point, part.normal, ray)
+    fn refine(&self, ray: &Ray64, _: f64) -> Surface64 {
+        flat_surface64(self.point, self.normal, ray)
     }
 
     #[inline(always)]
-    fn surface(row: &Row, rays: &RayPacket, t: Float8) -> Surface8 {
-        flat_surface(row.point, row.normal, rays, t)
+    fn surface([point, normal]: &[Vec3x8; 2], rays: &RayPacket, t: Float8) -> Surface8 {
+        flat_surface(*point, *normal, rays, t)
     }
 
-    fn uv(part: &PlanePart, point: DVec3) -> DVec2 {
-        let (x, y) = basis(part.normal);
-        let d = point - part.point;
+    fn uv(&self, point: DVec3) -> DVec2 {
+        let (x, y) = basis(self.normal);
+        let d = point - self.point;
         DVec2::new(d.dot(x), d.dot(y))
     }
 
-    fn bounds(_: &PlanePart) -> (DVec3, DVec3) {
+    fn bounds(&self) -> (DVec3, DVec3) {
         (DVec3::NEG_INFINITY, DVec3::INFINITY)
     }
 
-    fn owner(part: &PlanePart) -> Owner {
-        part.owner
-    }
-
-    fn sides(&self) -> &Sides {
-        &self.sides
-    }
-
-    fn column_bytes(&self) -> usize {
-        self.point.bytes() + self.normal.bytes()
+    fn owner(&self) -> Owner {
+        self.owner
     }
 }
 

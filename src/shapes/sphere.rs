@@ -4,33 +4,10 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3};
 
-use super::{Hidden8, Ray64, Sides, Store, Surface8, Surface64, column_of, nearer, roundings};
-use crate::lanes::{
-    Column, Column3, Float8, Hit8, LANES, Mask8, RayPacket, Vec3x8, difference_of_products, square_sum_minus,
-};
+use super::{Hidden8, Part, Ray64, Surface8, Surface64, nearer, roundings};
+use crate::lanes::{Float8, Hit8, Mask8, RayPacket, Vec3x8, difference_of_products};
 use crate::plan::{Owner, SpherePart};
 use crate::scene::Visible;
-
-/// All spheres of a render.
-#[derive(Debug)]
-pub struct Spheres {
-    center: Column3,     // scene units
-    radius: Column,      // scene units, > 0
-    center_low: Column3, // what rounding took from the center
-    radius_low: Column,  // and from the radius
-    sides: Sides,
-    parts: Vec<SpherePart>,
-}
-
-/// Eight rows.
-#[derive(Debug, Clone, Copy)]
-pub struct Row {
-    center: Vec3x8,
-    radius: Float8,
-    center_low: Vec3x8,
-    radius_low: Float8,
-    hidden: Hidden8,
-}
 
 /// Eight rows seen from eight origins.
 #[derive(Debug, Clone, Copy)]
@@ -40,75 +17,32 @@ pub struct Anchor {
     c: Float8,     // |f|^2 - r^2, which does not cancel
     near: Mask8,   // origins whose distance from the surface is small beside the radius
     bound: Float8, // error of the slack below, the rounding of the scene to f32 included
-    hidden: Hidden8,
 }
 
-impl Store for Spheres {
-    type Part = SpherePart;
-    type Row = Row;
+impl Part for SpherePart {
+    /// Center and radius.
+    type Rows = (Vec3x8, Float8);
     type Anchor = Anchor;
 
-    fn new(parts: Vec<SpherePart>, sides: Sides) -> Self {
-        let center = Column3::new(parts.iter().map(|part| part.center));
-        let radius = column_of(&parts, |part| part.radius);
-        let low = |x: f64| x - f64::from(x as f32);
-        let center_low = Column3::new(parts.iter().map(|part| DVec3::from_array(part.center.to_array().map(low))));
-        let radius_low = column_of(&parts, |part| low(part.radius));
-        Spheres { center, radius, center_low, radius_low, sides, parts }
-    }
-
-    fn parts(&self) -> &[SpherePart] {
-        &self.parts
+    fn row(&self) -> (DVec3, f64) {
+        (self.center, self.radius)
     }
 
     #[inline(always)]
-    fn splat(&self, i: usize) -> Row {
-        Row {
-            center: self.center.splat(i),
-            radius: self.radius.splat(i),
-            center_low: self.center_low.splat(i),
-            radius_low: self.radius_low.splat(i),
-            hidden: self.sides.splat(i),
-        }
-    }
-
-    #[inline(always)]
-    fn block(&self, first: usize) -> Row {
-        Row {
-            center: self.center.block(first),
-            radius: self.radius.block(first),
-            center_low: self.center_low.block(first),
-            radius_low: self.radius_low.block(first),
-            hidden: self.sides.block(first),
-        }
-    }
-
-    fn gather(&self, rows: [u32; LANES]) -> Row {
-        let hidden = self.sides.lanes(|lane| rows[lane] as usize);
-        Row {
-            center: self.center.gather(rows),
-            radius: self.radius.gather(rows),
-            center_low: self.center_low.gather(rows),
-            radius_low: self.radius_low.gather(rows),
-            hidden,
-        }
-    }
-
-    #[inline(always)]
-    fn anchor(row: &Row, origin: &Vec3x8) -> Anchor {
-        let f = row.center - *origin;
-        let (ff, r2) = (f.dot(f), row.radius * row.radius);
-        let near = Mask8::lt((ff - r2).abs(), r2);
+    fn anchor<'a>(rows: &Self::Rows, origin: &Vec3x8, part: impl Fn(usize) -> Option<&'a Self>) -> Anchor {
+        let (center, radius) = *rows;
+        let f = center - *origin;
+        let (ff, r2) = (f.dot(f), radius * radius);
         let mut c = ff - r2;
+        let near = Mask8::lt(c.abs(), r2);
         if near.any() {
-            c = near.select(row.height_product(f, origin), c);
+            c = near_products(near, c, origin, part);
         }
         // |c| rounds with the scene, f with the subtraction; 1-norms stand for lengths.
-        let reach = row.center.abs() + f.abs();
-        let reach = reach.x + reach.y + reach.z;
+        let reach = (center.abs() + f.abs()).sum();
         let far = roundings(6.0) * reach;
-        let bound = roundings(24.0) * r2 + roundings(3.0) * row.radius * reach + far * far;
-        Anchor { f, r2, c, near, bound, hidden: row.hidden }
+        let bound = roundings(24.0) * r2 + roundings(3.0) * radius * reach + far * far;
+        Anchor { f, r2, c, near, bound }
     }
 
     /// Shapes: eight lanes throughout. Units: `t` counts lengths of `dir`, which need not be 1.
@@ -119,8 +53,8 @@ impl Store for Spheres {
     /// from the product of both. Close to a surface that is large beside the distance, that distance
     /// says nothing and the discriminant is formed from compensated products instead.
     #[inline(always)]
-    fn hit<const CULL: bool>(anchor: &Anchor, rays: &RayPacket) -> Hit8 {
-        let Anchor { f, r2, c, near, bound, hidden } = *anchor;
+    fn hit<const CULL: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
+        let Anchor { f, r2, c, near, bound } = *anchor;
         let fd = f.dot(rays.dir);
         let p = fd * rays.inv_dd;
         let perp = rays.dir.mul_add(-p, f); // from the closest approach to the center
@@ -154,78 +88,69 @@ impl Store for Spheres {
         Hit8 { mask: hit.mask & !doubt, doubt, ..hit }
     }
 
-    fn decide(part: &SpherePart, ray: &Ray64, visible: Visible) -> Option<f64> {
-        let f = part.center - ray.origin;
-        let (disc, [a, b]) = roots(part, ray);
-        let reach = part.radius * (part.radius + f.length());
+    fn decide(&self, ray: &Ray64, visible: Visible) -> Option<f64> {
+        let f = self.center - ray.origin;
+        let (disc, [a, b]) = roots(self, ray);
+        let reach = self.radius * (self.radius + f.length());
         let bound = 8.0 * f64::EPSILON * ray.dir.length_squared() * reach;
         (disc >= -bound).then(|| ray.first(a.min(b), a.max(b), visible)).flatten()
     }
 
-    fn refine(part: &SpherePart, ray: &Ray64, t: f64) -> Surface64 {
-        let (_, [a, b]) = roots(part, ray);
+    fn refine(&self, ray: &Ray64, t: f64) -> Surface64 {
+        let (_, [a, b]) = roots(self, ray);
         let t = nearer(a, b, t);
-        let normal = (t * ray.dir - (part.center - ray.origin)).normalize();
-        Surface64 { t, point: part.center + normal * part.radius, normal }
+        let normal = (t * ray.dir - (self.center - ray.origin)).normalize();
+        Surface64 { t, point: self.center + normal * self.radius, normal }
     }
 
     /// From the decomposition that the kernel uses, never from (origin + t dir) - center.
     #[inline(always)]
-    fn surface(row: &Row, rays: &RayPacket, t: Float8) -> Surface8 {
-        let f = row.center - rays.origin;
+    fn surface(rows: &Self::Rows, rays: &RayPacket, t: Float8) -> Surface8 {
+        let (center, radius) = *rows;
+        let f = center - rays.origin;
         let p = f.dot(rays.dir) * rays.inv_dd;
         let perp = rays.dir.mul_add(-p, f);
         let normal = rays.dir.mul_add(t - p, -perp).normalize();
-        let norm = |v: Vec3x8| (v.abs().x + v.abs().y) + v.abs().z;
-        let by_center = roundings(6.0) * (norm(row.center) + row.radius);
-        let way = rays.dir * t;
-        let by_ray = roundings(6.0) * (norm(rays.origin) + norm(way) + norm(way));
+        let by_center = roundings(6.0) * (center.abs().sum() + radius);
+        let way = (rays.dir * t).abs().sum();
+        let by_ray = roundings(6.0) * (rays.origin.abs().sum() + way + way);
         // A sphere that is large beside the ray has a center too far away to start from.
         let along = Mask8::lt(by_ray, by_center);
-        let point = normal.mul_add(row.radius, row.center);
+        let point = normal.mul_add(radius, center);
         let point = Vec3x8::select(along, rays.dir.mul_add(t, rays.origin), point);
         Surface8 { point, normal, error: along.select(by_ray, by_center) }
     }
 
-    fn uv(part: &SpherePart, point: DVec3) -> DVec2 {
-        let n = (point - part.center).normalize();
+    fn uv(&self, point: DVec3) -> DVec2 {
+        let n = (point - self.center).normalize();
         let azimuth = n.z.atan2(n.x) / TAU;
         DVec2::new(azimuth - azimuth.floor(), n.y.clamp(-1.0, 1.0).acos() / PI)
     }
 
-    fn bounds(part: &SpherePart) -> (DVec3, DVec3) {
-        (part.center - part.radius, part.center + part.radius)
+    fn bounds(&self) -> (DVec3, DVec3) {
+        (self.center - self.radius, self.center + self.radius)
     }
 
-    fn owner(part: &SpherePart) -> Owner {
-        part.owner
-    }
-
-    fn sides(&self) -> &Sides {
-        &self.sides
-    }
-
-    fn column_bytes(&self) -> usize {
-        self.center.bytes() + self.radius.bytes() + self.center_low.bytes() + self.radius_low.bytes()
+    fn owner(&self) -> Owner {
+        self.owner
     }
 }
 
-impl Row {
-    /// `|f|^2 - r^2` where both are nearly the same, with what rounding took from the center, the radius and
-    /// `f` itself: beside a huge sphere that is more than the height above it.
-    fn height_product(&self, f: Vec3x8, origin: &Vec3x8) -> Float8 {
-        let lost = |c: Float8, o: Float8, f: Float8| {
-            let o_part = c - f;
-            (c - (f + o_part)) + (o_part - o)
-        };
-        let low = Vec3x8::new(
-            lost(self.center.x, origin.x, f.x),
-            lost(self.center.y, origin.y, f.y),
-            lost(self.center.z, origin.z, f.z),
-        ) + self.center_low;
-        let rest = f.dot(low) - self.radius * self.radius_low;
-        square_sum_minus(f.x, f.y, f.z, self.radius) + (rest + rest)
+/// `|f|^2 - r^2` where both are nearly the same, from the scene's own f64: beside a large sphere what rounding
+/// takes from the center and the radius is more than the height above it.
+#[inline(never)]
+fn near_products<'a>(
+    near: Mask8,
+    mut c: Float8,
+    origin: &Vec3x8,
+    part: impl Fn(usize) -> Option<&'a SpherePart>,
+) -> Float8 {
+    for lane in near.lanes() {
+        let Some(SpherePart { center, radius, .. }) = part(lane) else { continue };
+        let f = *center - DVec3::from_array(origin.lane(lane).map(f64::from));
+        c.as_mut_array()[lane] = (f.length_squared() - radius * radius) as f32;
     }
+    c
 }
 
 /// By Lagrange's identity: the discriminant `r^2 d.d - |f x d|^2`, and both roots (of a tangent where

@@ -2,56 +2,64 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{
-    Boxes, Cones, Cylinders, Disks, Planes, Polygons, Ray64, Sides, Spheres, Store, Surface8, Surface64, TurnedBoxes,
+use super::{Part, Ray64, Store, Surface8, Surface64};
+use crate::lanes::{Float8, LANES, Mask8, RayPacket};
+use crate::plan::{
+    BoxPart, ConePart, CylinderPart, DiskPart, Kind, Owner, Parts, PlanePart, PolygonPart, SpherePart, TurnedBoxPart,
 };
-use crate::lanes::{Float8, LANES, Mask8, RayPacket, Vec3x8};
-use crate::plan::{Kind, Owner, Parts};
 use crate::scene::Visible;
 
 /// One store a kind.
 #[derive(Debug)]
 pub struct Stores {
-    spheres: Spheres,
-    planes: Planes,
-    disks: Disks,
-    triangles: Polygons<3>,
-    quads: Polygons<4>,
-    octagons: Polygons<8>,
-    boxes: Boxes,
-    turned_boxes: TurnedBoxes,
-    cylinders: Cylinders,
-    cones: Cones,
-    /// By kind and row.
-    owners: Vec<Vec<Owner>>,
+    spheres: Store<SpherePart>,
+    planes: Store<PlanePart>,
+    disks: Store<DiskPart>,
+    triangles: Store<PolygonPart<3>>,
+    quads: Store<PolygonPart<4>>,
+    octagons: Store<PolygonPart<8>>,
+    boxes: Store<BoxPart>,
+    turned_boxes: Store<TurnedBoxPart>,
+    cylinders: Store<CylinderPart>,
+    cones: Store<ConePart>,
 }
+
+/// Sizes of the groups that the parts of each kind stand in.
+pub type Groups = [Vec<u8>; Kind::ALL.len()];
 
 /// Work on the store of a kind that is known at run time: compiled once for every kind.
 pub trait Visit {
     /// What comes of it.
     type Output;
     /// Does the work.
-    fn visit<S: Store>(self, store: &S) -> Self::Output;
+    fn visit<P: Part>(self, store: &Store<P>) -> Self::Output;
 }
 
 impl Stores {
-    /// Stores the parts in their order; `visible` tells which sides of a material are seen.
-    pub fn new(parts: Parts, visible: &[Visible]) -> Self {
-        let mut stores = Stores {
-            spheres: store(parts.spheres, visible),
-            planes: store(parts.planes, visible),
-            disks: store(parts.disks, visible),
-            triangles: store(parts.triangles, visible),
-            quads: store(parts.quads, visible),
-            octagons: store(parts.octagons, visible),
-            boxes: store(parts.boxes, visible),
-            turned_boxes: store(parts.turned_boxes, visible),
-            cylinders: store(parts.cylinders, visible),
-            cones: store(parts.cones, visible),
-            owners: Vec::new(),
-        };
-        stores.owners = Kind::ALL.iter().map(|kind| stores.visit(*kind, Owners)).collect();
-        stores
+    /// Stores the parts in their order; `groups` tells which of them belong together (without, eight by eight),
+    /// `visible` which sides of a material are seen.
+    pub fn new(parts: Parts, groups: Option<&Groups>, visible: &[Visible]) -> Self {
+        fn store<P: Part>(kind: Kind, parts: Vec<P>, groups: Option<&Groups>, visible: &[Visible]) -> Store<P> {
+            match groups.map(|groups| &groups[kind as usize]) {
+                Some(groups) => Store::new(parts, groups.iter().map(|count| usize::from(*count)), visible),
+                None => {
+                    let count = parts.len();
+                    Store::new(parts, (0..count).step_by(LANES).map(|first| LANES.min(count - first)), visible)
+                }
+            }
+        }
+        Stores {
+            spheres: store(Kind::Sphere, parts.spheres, groups, visible),
+            planes: store(Kind::Plane, parts.planes, None, visible),
+            disks: store(Kind::Disk, parts.disks, groups, visible),
+            triangles: store(Kind::Triangle, parts.triangles, groups, visible),
+            quads: store(Kind::Quad, parts.quads, groups, visible),
+            octagons: store(Kind::Octagon, parts.octagons, groups, visible),
+            boxes: store(Kind::Box, parts.boxes, groups, visible),
+            turned_boxes: store(Kind::TurnedBox, parts.turned_boxes, groups, visible),
+            cylinders: store(Kind::Cylinder, parts.cylinders, groups, visible),
+            cones: store(Kind::Cone, parts.cones, groups, visible),
+        }
     }
 
     /// Sends a visitor to the store of a kind.
@@ -71,15 +79,15 @@ impl Stores {
         }
     }
 
-    /// How many parts of a kind there are.
-    pub fn count(&self, kind: Kind) -> usize {
-        self.visit(kind, Count)
+    /// How many blocks of a kind there are.
+    pub fn blocks(&self, kind: Kind) -> usize {
+        self.visit(kind, Blocks)
     }
 
     /// Whose part a row is.
     #[inline(always)]
     pub fn owner(&self, kind: Kind, row: usize) -> Owner {
-        self.owners[kind as usize][row]
+        self.visit(kind, OwnerOf(row))
     }
 
     /// Which of two rows wins where both are met at the same `t`: the primitive of the lowest index, and
@@ -93,34 +101,60 @@ impl Stores {
         }
     }
 
-    /// Where eight rays meet the rows that they met, whatever their kinds. Lanes that missed mean nothing.
-    pub fn surface(&self, hits: Float8, rays: &RayPacket, t: Float8) -> Surface8 {
+    /// Where eight rays meet the rows that they met, whatever their kinds, and whose those are. Lanes that missed
+    /// mean nothing. With `NORMAL` alone, points and their errors are left out.
+    #[inline(always)]
+    pub fn surface<const NORMAL: bool>(&self, hits: Float8, rays: &RayPacket, t: Float8) -> (Surface8, [Owner; LANES]) {
         let hits = hits.to_array().map(RowRef::from_lane);
-        let mut surface = Surface8 { point: Vec3x8::ZERO, normal: Vec3x8::ZERO, error: Float8::ZERO };
-        let mut done = 0u32;
+        let Some((kind, first)) = hits.iter().find_map(|hit| Some((hit.kind()?, hit.row()))) else {
+            return (Surface8::NOTHING, [Owner::default(); LANES]);
+        };
+        let of_kind = |kind| {
+            let same = hits.map(|hit| hit.is_of(kind));
+            let rows = std::array::from_fn(|lane| if same[lane] { hits[lane].row() } else { first });
+            (rows, same)
+        };
+        let (rows, same) = of_kind(kind);
+        let (mut surface, mut owners) = self.visit(kind, SurfaceOf::<NORMAL> { rows, rays, t });
+        let other = |lane: &usize| !same[*lane] && hits[*lane] != RowRef::MISS;
+        if (0..LANES).any(|lane| other(&lane)) {
+            self.add_other_kinds::<NORMAL>(kind, &hits, (rays, t), &mut surface, &mut owners);
+        }
+        (surface, owners)
+    }
+
+    #[inline(never)]
+    fn add_other_kinds<const NORMAL: bool>(
+        &self,
+        done: Kind,
+        hits: &[RowRef; LANES],
+        (rays, t): (&RayPacket, Float8),
+        surface: &mut Surface8,
+        owners: &mut [Owner; LANES],
+    ) {
+        let mut done = 1u32 << done as u32;
         for hit in hits {
             let Some(kind) = hit.kind().filter(|kind| done >> *kind as u32 & 1 == 0) else { continue };
-            let (mut rows, mut same) = ([0; LANES], 0);
-            for (lane, hit) in hits.into_iter().enumerate() {
-                let is_same = hit.is_of(kind);
-                rows[lane] = if is_same { hit.row() as u32 } else { 0 };
-                same |= u32::from(is_same) << lane;
-            }
-            let found = self.visit(kind, SurfaceOf { rows, rays, t });
-            surface = if done == 0 { found } else { surface.with(Mask8::from_bits(same), &found) };
             done |= 1 << kind as u32;
+            let rows = hits.map(|other| if other.is_of(kind) { other.row() } else { hit.row() });
+            let (found, whose) = self.visit(kind, SurfaceOf::<NORMAL> { rows, rays, t });
+            let mut same = 0;
+            for lane in (0..LANES).filter(|lane| hits[*lane].is_of(kind)) {
+                owners[lane] = whose[lane];
+                same |= 1 << lane;
+            }
+            *surface = surface.with(Mask8::from_bits(same), &found);
         }
-        surface
     }
 
     /// What a ray meets on a row near `t`, in f64.
     pub fn refine(&self, row: RowRef, ray: &Ray64, t: f64) -> Option<Surface64> {
-        row.kind().map(|kind| self.visit(kind, Refine { row: row.row(), ray, t }))
+        row.kind().and_then(|kind| self.visit(kind, Refine { row: row.row(), ray, t }))
     }
 
     /// Texture coordinates of a point, relative to the plan's origin, on a row.
     pub fn uv(&self, row: RowRef, point: DVec3) -> Option<DVec2> {
-        row.kind().map(|kind| self.visit(kind, UvOf { row: row.row(), point }))
+        row.kind().and_then(|kind| self.visit(kind, UvOf { row: row.row(), point }))
     }
 
     /// Whether any row of any kind hides a side.
@@ -130,14 +164,8 @@ impl Stores {
 
     /// Memory of the columns in bytes.
     pub fn column_bytes(&self) -> usize {
-        let owners = self.owners.iter().map(|owners| owners.capacity() * size_of::<Owner>()).sum::<usize>();
-        owners + Kind::ALL.iter().map(|kind| self.visit(*kind, ColumnBytes)).sum::<usize>()
+        Kind::ALL.iter().map(|kind| self.visit(*kind, ColumnBytes)).sum::<usize>()
     }
-}
-
-fn store<S: Store>(parts: Vec<S::Part>, visible: &[Visible]) -> S {
-    let sides = parts.iter().map(|part| visible[S::owner(part).material as usize]).collect();
-    S::new(parts, Sides::new(sides))
 }
 
 /// A row of a store: kind and row in 32 bits, so that eight fit a vector of lanes.
@@ -187,34 +215,42 @@ impl RowRef {
     }
 }
 
-struct Count;
+struct Blocks;
 
-impl Visit for Count {
+impl Visit for Blocks {
     type Output = usize;
-    fn visit<S: Store>(self, store: &S) -> usize {
-        store.parts().len()
+    fn visit<P: Part>(self, store: &Store<P>) -> usize {
+        store.blocks()
     }
 }
 
-struct Owners;
+struct OwnerOf(usize);
 
-impl Visit for Owners {
-    type Output = Vec<Owner>;
-    fn visit<S: Store>(self, store: &S) -> Vec<Owner> {
-        store.parts().iter().map(S::owner).collect()
+impl Visit for OwnerOf {
+    type Output = Owner;
+    #[inline(always)]
+    fn visit<P: Part>(self, store: &Store<P>) -> Owner {
+        store.owner(self.0)
     }
 }
 
-struct SurfaceOf<'a> {
-    rows: [u32; LANES],
+struct SurfaceOf<'a, const NORMAL: bool> {
+    rows: [usize; LANES],
     rays: &'a RayPacket,
     t: Float8,
 }
 
-impl Visit for SurfaceOf<'_> {
-    type Output = Surface8;
-    fn visit<S: Store>(self, store: &S) -> Surface8 {
-        S::surface(&store.gather(self.rows), self.rays, self.t)
+impl<const NORMAL: bool> Visit for SurfaceOf<'_, NORMAL> {
+    type Output = (Surface8, [Owner; LANES]);
+    #[inline(never)]
+    fn visit<P: Part>(self, store: &Store<P>) -> Self::Output {
+        let first = self.rows[0];
+        let (surface, owners) = match self.rows == [first; LANES] {
+            true => (P::surface(&store.splat(first), self.rays, self.t), [store.owner(first); LANES]),
+            false => (P::surface(&store.gather(self.rows), self.rays, self.t), self.rows.map(|row| store.owner(row))),
+        };
+        let surface = if NORMAL { Surface8 { normal: surface.normal, ..Surface8::NOTHING } } else { surface };
+        (surface, owners)
     }
 }
 
@@ -225,9 +261,9 @@ struct Refine<'a> {
 }
 
 impl Visit for Refine<'_> {
-    type Output = Surface64;
-    fn visit<S: Store>(self, store: &S) -> Surface64 {
-        S::refine(&store.parts()[self.row], self.ray, self.t)
+    type Output = Option<Surface64>;
+    fn visit<P: Part>(self, store: &Store<P>) -> Self::Output {
+        store.part(self.row).map(|part| part.refine(self.ray, self.t))
     }
 }
 
@@ -237,9 +273,9 @@ struct UvOf {
 }
 
 impl Visit for UvOf {
-    type Output = DVec2;
-    fn visit<S: Store>(self, store: &S) -> DVec2 {
-        S::uv(&store.parts()[self.row], self.point)
+    type Output = Option<DVec2>;
+    fn visit<P: Part>(self, store: &Store<P>) -> Self::Output {
+        store.part(self.row).map(|part| part.uv(self.point))
     }
 }
 
@@ -247,7 +283,7 @@ struct HideAny;
 
 impl Visit for HideAny {
     type Output = bool;
-    fn visit<S: Store>(self, store: &S) -> bool {
+    fn visit<P: Part>(self, store: &Store<P>) -> bool {
         store.sides().hide_any()
     }
 }
@@ -256,7 +292,7 @@ struct ColumnBytes;
 
 impl Visit for ColumnBytes {
     type Output = usize;
-    fn visit<S: Store>(self, store: &S) -> usize {
+    fn visit<P: Part>(self, store: &Store<P>) -> usize {
         store.column_bytes()
     }
 }

@@ -107,7 +107,7 @@ fn compare(name: &str, bench: &mut Bench, count: usize) -> Tally {
     let references = bench.references();
     let rays = bench.rays(&references, count);
     let plan = Plan::new(&bench.scene, DVec3::ZERO);
-    let stores = Stores::new(plan.parts(), &plan.visible);
+    let stores = Stores::new(plan.parts(), None, &plan.visible);
     let cull = stores.hide_any();
     let mut tally = Tally::default();
     for eight in rays.chunks(LANES) {
@@ -183,7 +183,7 @@ fn dead_lanes_never_hit_and_never_matter() {
         let references = bench.references();
         let rays = bench.rays(&references, 200);
         let plan = Plan::new(&bench.scene, DVec3::ZERO);
-        let stores = Stores::new(plan.parts(), &plan.visible);
+        let stores = Stores::new(plan.parts(), None, &plan.visible);
         for (case, eight) in rays.chunks_exact(LANES).enumerate() {
             let full = RayPacket::gather(eight);
             let live = match case {
@@ -243,7 +243,7 @@ fn surfaces_are_where_the_reference_has_them() {
             let mut bench = Bench::new(maker, at(place), scale, Visible::Both);
             let references = bench.references();
             let plan = Plan::new(&bench.scene, DVec3::ZERO);
-            let stores = Stores::new(plan.parts(), &plan.visible);
+            let stores = Stores::new(plan.parts(), None, &plan.visible);
             let wide = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
             for case in 0..4000 {
                 let (center, dice) = (bench.center, &mut bench.dice);
@@ -271,7 +271,7 @@ fn surfaces_are_where_the_reference_has_them() {
                 assert!(near_tip || turned <= 1e-12 + 20.0 * bound / scale, "{} {fine:?} {turned:e}", context());
 
                 let lanes = Float8::splat(row.to_lane());
-                let coarse = stores.surface(lanes, &RayPacket::splat(&ray), Float8::splat(t));
+                let (coarse, _) = stores.surface::<false>(lanes, &RayPacket::splat(&ray), Float8::splat(t));
                 let (point, normal) = (wide(coarse.point.lane(3)), wide(coarse.normal.lane(3)));
                 let off = point - want.point;
                 let other_face = normal.dot(want.normal) < 0.9;

@@ -3,29 +3,10 @@
 use glam::{DVec2, DVec3};
 
 use super::cuboid::{face, face_uv, face64, first_of, slabs, slabs64};
-use super::{Hidden8, Ray64, Sides, Store, Surface8, Surface64, nearer, roundings};
-use crate::lanes::{Column3, Float8, Hit8, LANES, RayPacket, Vec3x8};
+use super::{Hidden8, Part, Ray64, Surface8, Surface64, nearer, roundings};
+use crate::lanes::{Float8, Hit8, RayPacket, Vec3x8};
 use crate::plan::{Owner, TurnedBoxPart};
 use crate::scene::Visible;
-
-/// All turned boxes of a render.
-#[derive(Debug)]
-pub struct TurnedBoxes {
-    center: Column3,    // scene units
-    half: Column3,      // scene units along the axes, > 0
-    axes: [Column3; 3], // unit, at right angles
-    sides: Sides,
-    parts: Vec<TurnedBoxPart>,
-}
-
-/// Eight rows.
-#[derive(Debug, Clone, Copy)]
-pub struct Row {
-    center: Vec3x8,
-    half: Vec3x8,
-    axes: [Vec3x8; 3],
-    hidden: Hidden8,
-}
 
 /// Eight rows seen from eight origins.
 #[derive(Debug, Clone, Copy)]
@@ -33,98 +14,66 @@ pub struct Anchor {
     min: Vec3x8, // corners relative to the origin, in the frame of the box
     max: Vec3x8,
     axes: [Vec3x8; 3],
-    hidden: Hidden8,
 }
 
-impl Store for TurnedBoxes {
-    type Part = TurnedBoxPart;
-    type Row = Row;
+impl Part for TurnedBoxPart {
+    /// Center and half size, and the unit axes.
+    type Rows = ([Vec3x8; 2], [Vec3x8; 3]);
     type Anchor = Anchor;
 
-    fn new(parts: Vec<TurnedBoxPart>, sides: Sides) -> Self {
-        let center = Column3::new(parts.iter().map(|part| part.center));
-        let half = Column3::new(parts.iter().map(|part| part.half));
-        let axes = std::array::from_fn(|k| Column3::new(parts.iter().map(move |part| part.axes[k])));
-        TurnedBoxes { center, half, axes, sides, parts }
-    }
-
-    fn parts(&self) -> &[TurnedBoxPart] {
-        &self.parts
-    }
-
-    fn splat(&self, i: usize) -> Row {
-        let axes = std::array::from_fn(|k| self.axes[k].splat(i));
-        Row { center: self.center.splat(i), half: self.half.splat(i), axes, hidden: self.sides.splat(i) }
-    }
-
-    fn block(&self, first: usize) -> Row {
-        let axes = std::array::from_fn(|k| self.axes[k].block(first));
-        Row { center: self.center.block(first), half: self.half.block(first), axes, hidden: self.sides.block(first) }
-    }
-
-    fn gather(&self, rows: [u32; LANES]) -> Row {
-        let axes = std::array::from_fn(|k| self.axes[k].gather(rows));
-        let hidden = self.sides.lanes(|lane| rows[lane] as usize);
-        Row { center: self.center.gather(rows), half: self.half.gather(rows), axes, hidden }
+    fn row(&self) -> ([DVec3; 2], [DVec3; 3]) {
+        ([self.center, self.half], self.axes)
     }
 
     /// The difference is turned, not its two ends: far from the origin that keeps the box's size.
     #[inline(always)]
-    fn anchor(row: &Row, origin: &Vec3x8) -> Anchor {
-        let f = local(&row.axes, row.center - *origin);
-        Anchor { min: f - row.half, max: f + row.half, axes: row.axes, hidden: row.hidden }
+    fn anchor<'a>(rows: &Self::Rows, origin: &Vec3x8, _: impl Fn(usize) -> Option<&'a Self>) -> Anchor {
+        let ([center, half], axes) = *rows;
+        let f = local(&axes, center - *origin);
+        Anchor { min: f - half, max: f + half, axes }
     }
 
     #[inline(always)]
-    fn hit<const CULL: bool>(anchor: &Anchor, rays: &RayPacket) -> Hit8 {
+    fn hit<const CULL: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
         let (entry, exit) = slabs(anchor.min, anchor.max, local(&anchor.axes, rays.dir));
-        first_of::<CULL>(entry, exit, &anchor.hidden, rays)
+        first_of::<CULL>(entry, exit, hidden, rays)
     }
 
-    fn decide(part: &TurnedBoxPart, ray: &Ray64, visible: Visible) -> Option<f64> {
-        let f = part.local(part.center - ray.origin);
-        let (entry, exit) = slabs64(f - part.half, f + part.half, part.local(ray.dir));
+    fn decide(&self, ray: &Ray64, visible: Visible) -> Option<f64> {
+        let f = self.local(self.center - ray.origin);
+        let (entry, exit) = slabs64(f - self.half, f + self.half, self.local(ray.dir));
         (entry <= exit).then(|| ray.first(entry, exit, visible)).flatten()
     }
 
-    fn refine(part: &TurnedBoxPart, ray: &Ray64, t: f64) -> Surface64 {
-        let (f, dir) = (part.local(part.center - ray.origin), part.local(ray.dir));
-        let (entry, exit) = slabs64(f - part.half, f + part.half, dir);
+    fn refine(&self, ray: &Ray64, t: f64) -> Surface64 {
+        let (f, dir) = (self.local(self.center - ray.origin), self.local(ray.dir));
+        let (entry, exit) = slabs64(f - self.half, f + self.half, dir);
         let t = nearer(entry, exit, t);
-        let (point, normal) = face64(-part.half, part.half, t * dir - f);
-        let turn = |v: DVec3| (0..3).map(|k| part.axes[k] * v[k]).sum::<DVec3>();
-        Surface64 { t, point: part.center + turn(point), normal: turn(normal) }
+        let (point, normal) = face64(-self.half, self.half, t * dir - f);
+        let turn = |v: DVec3| (0..3).map(|k| self.axes[k] * v[k]).sum::<DVec3>();
+        Surface64 { t, point: self.center + turn(point), normal: turn(normal) }
     }
 
-    fn surface(row: &Row, rays: &RayPacket, t: Float8) -> Surface8 {
-        let from_center = rays.dir.mul_add(t, rays.origin - row.center);
-        let (point, normal) = face(-row.half, row.half, local(&row.axes, from_center));
-        let turn = |v: Vec3x8| row.axes[0].mul_add(v.x, row.axes[1].mul_add(v.y, row.axes[2] * v.z));
-        let reach = row.center.abs();
-        let size = row.half.x + row.half.y + row.half.z;
-        let error = roundings(4.0) * (reach.x + reach.y + reach.z) + roundings(8.0) * size;
-        Surface8 { point: row.center + turn(point), normal: turn(normal), error }
+    fn surface(rows: &Self::Rows, rays: &RayPacket, t: Float8) -> Surface8 {
+        let ([center, half], axes) = *rows;
+        let from_center = rays.dir.mul_add(t, rays.origin - center);
+        let (point, normal) = face(-half, half, local(&axes, from_center));
+        let turn = |v: Vec3x8| axes[0].mul_add(v.x, axes[1].mul_add(v.y, axes[2] * v.z));
+        let error = roundings(4.0) * center.abs().sum() + roundings(8.0) * half.sum();
+        Surface8 { point: center + turn(point), normal: turn(normal), error }
     }
 
-    fn uv(part: &TurnedBoxPart, point: DVec3) -> DVec2 {
-        face_uv(-part.half, part.half, part.local(point - part.center))
+    fn uv(&self, point: DVec3) -> DVec2 {
+        face_uv(-self.half, self.half, self.local(point - self.center))
     }
 
-    fn bounds(part: &TurnedBoxPart) -> (DVec3, DVec3) {
-        let half: DVec3 = (0..3).map(|k| part.axes[k].abs() * part.half[k]).sum();
-        (part.center - half, part.center + half)
+    fn bounds(&self) -> (DVec3, DVec3) {
+        let half: DVec3 = (0..3).map(|k| self.axes[k].abs() * self.half[k]).sum();
+        (self.center - half, self.center + half)
     }
 
-    fn owner(part: &TurnedBoxPart) -> Owner {
-        part.owner
-    }
-
-    fn sides(&self) -> &Sides {
-        &self.sides
-    }
-
-    fn column_bytes(&self) -> usize {
-        self.center.bytes() + self.half.bytes() + self.axes.iter().map(Column3::bytes).sum::<usize>()
+    fn owner(&self) -> Owner {
+        self.owner
     }
 }
 
