@@ -24,6 +24,6 @@ extern crate self as octray;
 mod fixtures;
 
 pub use lanes::Ray;
-pub use render::{Progress, Query, Renderer, Rendering};
+pub use render::{Batch, Progress, Query, Renderer, Rendering};
 pub use scene::Scene;
 pub use tracer::{Hit, Tracer};

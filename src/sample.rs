@@ -49,6 +49,34 @@ impl Pattern {
     }
 }
 
+/// The patterns of eight samples, side by side.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Pattern8 {
+    order: [u32; 8],
+    first: [u32; 8],
+    second: [u32; 8],
+}
+
+impl Pattern8 {
+    /// Sets the pattern of one lane.
+    #[inline(always)]
+    pub fn set(&mut self, lane: usize, pattern: Pattern) {
+        (self.order[lane], self.first[lane], self.second[lane]) = (pattern.order, pattern.first, pattern.second);
+    }
+
+    /// Eight samples at once: the same bits as [`Pattern::sample`] one by one.
+    #[inline(always)]
+    pub fn sample(&self, index: &[u32; 8]) -> [[u32; 8]; 2] {
+        let (mut first, mut second) = ([0; 8], [0; 8]);
+        for lane in 0..8 {
+            let i = laine_karras(index[lane].reverse_bits(), self.order[lane]).reverse_bits();
+            first[lane] = laine_karras(i, self.first[lane]).reverse_bits();
+            second[lane] = laine_karras(pascal(i), self.second[lane]).reverse_bits();
+        }
+        [first, second]
+    }
+}
+
 /// Sample `index` of a pixel in one pair of dimensions, as fractions of 2^32.
 #[inline]
 pub fn pair(pixel_key: u32, index: u32, dimension: u32) -> [u32; 2] {
@@ -62,7 +90,7 @@ pub fn unit(bits: u32) -> f64 {
 }
 
 /// Owen scrambling of bit-reversed digits: every bit is flipped by a hash of those below it.
-#[inline]
+#[inline(always)]
 fn laine_karras(mut x: u32, key: u32) -> u32 {
     x ^= x.wrapping_mul(0x3d20_adea);
     x = x.wrapping_add(key);
@@ -72,7 +100,7 @@ fn laine_karras(mut x: u32, key: u32) -> u32 {
 }
 
 /// Sobol's second dimension, bits reversed: the index times Pascal's triangle modulo 2.
-#[inline]
+#[inline(always)]
 fn pascal(mut i: u32) -> u32 {
     i ^= (i >> 16) & 0x0000_ffff;
     i ^= (i >> 8) & 0x00ff_00ff;
@@ -102,6 +130,17 @@ fn mix(mut x: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn eight_samples_are_the_same_as_one_by_one() {
+        let (key, index) = (|lane: usize| lane as u32 * 77 + 5, std::array::from_fn(|lane| lane as u32 * 1_000_003));
+        let mut eight = Pattern8::default();
+        (0..8).for_each(|lane| eight.set(lane, Pattern::new(key(lane), 1)));
+        let [first, second] = eight.sample(&index);
+        for (lane, index) in index.into_iter().enumerate() {
+            assert_eq!(pair(key(lane), index, 1), [first[lane], second[lane]]);
+        }
+    }
 
     /// Sobol's second dimension by its textbook recurrence (Bratley and Fox, 1988): v_j = v_{j-1} ^ v_{j-1}/2.
     fn sobol1(index: u32) -> u32 {

@@ -217,7 +217,10 @@ fn a_million_corners_are_one_error() {
 fn files_that_are_no_scenes_get_their_messages() {
     let load = |path: &str| Scene::load(path).unwrap_err().to_string();
     assert!(load("tests/none.toml").starts_with("tests/none.toml: cannot be read: "));
-    assert_eq!(load("tests/bad_scenes.rs"), "tests/bad_scenes.rs: a scene file must end in .toml, .nff or .nff.gz");
+    assert_eq!(
+        load("tests/bad_scenes.rs"),
+        "tests/bad_scenes.rs: a scene file must end in .toml, .nff or .nff.gz, or as atoms do: .xyz, .extxyz, .lammpstrj, .dump, .lmp, .data, .pdb, .ent, .sdf, .mol"
+    );
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.toml");
     fs::create_dir(&path).unwrap();

@@ -522,6 +522,134 @@ fn included_files_come_first() {
     assert_eq!(materials, [2, 1], "a name of the including file serves the included one");
 }
 
+/// Numbers and vectors of all parts by keys.
+const KEYED: &str = r##"
+format = 1
+[image]
+width = 64
+height = 48
+spp = { keys = [[1, 1], [3, 4]] }
+[camera]
+type = "pinhole"
+vfov = { keys = [[1, 20], [11, 40]], interpolation = "linear" }
+eye = { keys = [[1, [0, 0, 8]], [11, [8, 0, 0]], [21, [0, 0, -8]]], interpolation = "smooth" }
+target = [0, 0, 0]
+[background]
+top = { keys = [[1, [0, 0, 0]], [11, [1, 0.5, 0]]] }
+bottom = [0, 0, 0]
+[materials.a]
+type = "diffuse"
+albedo = { keys = [[1, [1, 0, 0]], [6, [0, 1, 0]]], interpolation = "step" }
+[materials.b]
+type = "mirror"
+[[lights]]
+type = "point"
+position = { keys = [[1, [0, 0, 0]], [11, [0, 10, 0]]] }
+intensity = [1, 1, 1]
+[[groups]]
+name = "g"
+rotation = { axis = [0, 0, 1], angle = { keys = [[1, 0], [11, 360]] } }
+translate = { keys = [[1, [0, 0, 0]], [2, [1, 0, 0]]] }
+[[shapes]]
+type = "sphere"
+center = [2, 0, 0]
+radius = { keys = [[-5, 1], [5, 2]] }
+material = "a"
+group = "g"
+[[shapes]]
+type = "polygon"
+corners = [[0, 0, 0], { keys = [[1, [1, 0, 0]], [11, [3, 0, 0]]] }, [0, 1, 0]]
+material = "b"
+"##;
+
+#[test]
+fn values_follow_their_keys() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("keyed.toml");
+    fs::write(&path, KEYED).unwrap();
+    let at = |frame| Scene::load_frame(&path, frame).unwrap_or_else(|errors| panic!("{}", errors.report(false)));
+    let scene = at(6);
+    assert_eq!(scene.image.unwrap().spp, 4);
+    assert_eq!(scene.cameras[0].lens, Lens::Pinhole { vfov: 30.0 });
+    let Backdrop::Gradient { top, .. } = scene.background.backdrop else { panic!() };
+    assert_eq!(top, dvec3(0.5, 0.25, 0.0));
+    assert_eq!(scene.materials[0].model, Model::Diffuse { albedo: color(0.0, 1.0, 0.0) });
+    let Source::Point { position, .. } = scene.lights[0].source else { panic!() };
+    assert_eq!(position, dvec3(0.0, 5.0, 0.0));
+    // (2, 0, 0) half around z, then one along x.
+    let Shape::Sphere(sphere) = &scene.objects[0].shape else { panic!() };
+    assert!(sphere.center.abs_diff_eq(dvec3(-1.0, 0.0, 0.0), 1e-12), "{sphere:?}");
+    assert_eq!(sphere.radius, 2.0);
+    let Shape::Polygon(polygon) = &scene.objects[1].shape else { panic!() };
+    assert_eq!(polygon.corners[1], dvec3(2.0, 0.0, 0.0));
+    assert_eq!(at(2).image.unwrap().spp, 3, "2.5 rounded");
+    assert_eq!(at(5).materials[0].model, Model::Diffuse { albedo: color(1.0, 0.0, 0.0) });
+    assert_eq!((at(-9).cameras[0].eye, at(99).cameras[0].eye), (dvec3(0.0, 0.0, 8.0), dvec3(0.0, 0.0, -8.0)));
+    assert_eq!(at(11).cameras[0].eye, dvec3(8.0, 0.0, 0.0));
+}
+
+/// A turntable keeps its distance and its height, and sees the same as the first frame where it has gone around.
+#[test]
+fn cameras_orbit_what_they_look_at() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("turn.toml");
+    let ball = "[materials.a]\ntype = \"mirror\"\n[[shapes]]\ntype = \"sphere\"\ncenter = [1, 2, 3]\nradius = 2\nmaterial = \"a\"\n";
+    let orbit = "orbit = { keys = [[1, 0], [5, 360]] }";
+    fs::write(
+        &path,
+        format!("[camera]\ntype = \"pinhole\"\nvfov = 60\neye = [4, 1, 0]\ntarget = [1, 0, 0]\n{orbit}\n{ball}"),
+    )
+    .unwrap();
+    let eye = |frame| Scene::load_frame(&path, frame).unwrap().cameras[0].eye;
+    assert_eq!((eye(1), eye(5)), (dvec3(4.0, 1.0, 0.0), dvec3(4.0, 1.0, 0.0)));
+    assert!(eye(2).abs_diff_eq(dvec3(1.0, 1.0, -3.0), 1e-14), "a quarter to the right: {}", eye(2));
+    // Without eye and target the whole scene is in the picture, from all sides at the same distance.
+    fs::write(&path, format!("[camera]\ntype = \"pinhole\"\nvfov = 60\n{orbit}\n{ball}")).unwrap();
+    for frame in 1..5 {
+        let camera = Scene::load_frame(&path, frame).unwrap().cameras[0].clone();
+        assert!(camera.target.abs_diff_eq(dvec3(1.0, 2.0, 3.0), 1e-14));
+        let distance = (camera.eye - camera.target).length();
+        assert!((4.0..4.3).contains(&distance), "2/sin(30 degrees) and some room: {distance}");
+    }
+}
+
+#[test]
+fn files_may_be_one_a_frame() {
+    let dir = files();
+    fs::copy(dir.path().join("photo.png"), dir.path().join("photo.0007.png")).unwrap();
+    fs::write(dir.path().join("p.0007.csv"), "x,y,z,r\n7,0,0,1\n").unwrap();
+    let path = dir.path().join("a.toml");
+    let text = "[textures.t]\ntype = \"image\"\nfile = \"photo.#.png\"\n[materials.a]\ntype = \"diffuse\"\nalbedo = { texture = \"t\" }\n\
+                [[clouds]]\ntype = \"spheres\"\nmaterial = \"a\"\nfile = \"p.%04d.csv\"\n";
+    fs::write(&path, text).unwrap();
+    let scene = Scene::load_frame(&path, 7).unwrap();
+    assert_eq!(scene.clouds[0].shapes.len(), 1);
+    let errors = Scene::load_frame(&path, 8).unwrap_err().to_string();
+    assert!(
+        errors.contains("a.toml:3:8: photo.0008.png cannot be read")
+            && errors.contains("a.toml:10:8: p.0008.csv cannot be read"),
+        "{errors}"
+    );
+    // A file of this very name is meant where there is one.
+    fs::write(dir.path().join("p.%04d.csv"), "x,y,z,r\n1,0,0,1\n2,0,0,1\n").unwrap();
+    assert_eq!(Scene::load_frame(&path, 7).unwrap().clouds[0].shapes.len(), 2);
+}
+
+#[test]
+fn clouds_of_cylinders_arrive() {
+    let dir = files();
+    fs::write(dir.path().join("c.csv"), "base_x,base_y,base_z,apex_x,apex_y,apex_z,r\n1,2,3,4,5,6,0.5\n").unwrap();
+    let cloud = |caps: &str| {
+        let text = format!(
+            "[materials.a]\ntype = \"mirror\"\n[[clouds]]\ntype = \"cylinders\"\nmaterial = \"a\"\nfile = \"c.csv\"\n{caps}"
+        );
+        Scene::from_toml(&text, dir.path()).unwrap().primitive(0).unwrap().shape.into_owned()
+    };
+    let cylinder = Cylinder { base: dvec3(1., 2., 3.), apex: dvec3(4., 5., 6.), radius: 0.5, caps: true };
+    assert_eq!(cloud(""), Shape::Cylinder(cylinder));
+    assert_eq!(cloud("caps = false\n"), Shape::Cylinder(Cylinder { caps: false, ..cylinder }));
+}
+
 /// The definitions that a schema node allows: its own, or each of its `oneOf`.
 fn choices<'s>(schema: &'s Value, node: &'s Value) -> Vec<&'s Value> {
     let follow = |node: &'s Value| match node["$ref"].as_str() {
@@ -569,12 +697,18 @@ fn the_schema_and_the_reader_know_the_same_keys() {
     tables.insert(shape, &schema["$defs"]["rotation"]);
     let paint = "[materials.x]\ntype = \"mirror\"\nreflectance = { no_such_key = 1 }\n".to_owned();
     tables.insert(paint, &schema["$defs"]["textured"]);
+    let keyed = "[render]\nseed = { keys = [[1, 1]], no_such_key = 1 }\n".to_owned();
+    tables.insert(keyed, &schema["$defs"]["keyed_number"]);
+    for (key, node) in [("radius", "radius_column"), ("color", "color_column")] {
+        let text = format!("[[clouds]]\ntype = \"particles\"\n{key} = {{ no_such_key = 1 }}\n");
+        tables.insert(text, &schema["$defs"][node]);
+    }
     for (text, node) in &tables {
         let mut by_schema: Vec<_> = node["properties"].as_object().unwrap().keys().cloned().collect();
         by_schema.sort();
         assert_eq!(keys_by_reader(text), by_schema, "{text}");
     }
-    assert_eq!(tables.len(), 32, "{:?}", tables.keys());
+    assert_eq!(tables.len(), 37, "{:?}", tables.keys());
 }
 
 #[test]
@@ -587,7 +721,7 @@ fn the_schema_accepts_good_scenes() {
         [[shapes]]\ntype = \"plane\"\npoint = [1, 2, 3]\nnormal = [0, 0, 5]\nmaterial = \"a\"\n\
         [[shapes]]\ntype = \"box\"\ncenter = [1, 1, 1]\nsize = [2, 4, 6]\nrotation = { axis = [0, 1, 0], angle = 30 }\nmaterial = \"a\"\n\
         [[clouds]]\ntype = \"polygons\"\nfile = \"corners.csv\"\nsizes = \"sizes.csv\"\nmaterial = \"a\"\n";
-    for text in [rich.as_str(), other] {
+    for text in [rich.as_str(), other, KEYED] {
         read(text);
         let scene = json(text).unwrap();
         let errors: Vec<_> =

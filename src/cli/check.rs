@@ -7,7 +7,7 @@ use octray::measure::check::{CheckSettings, check};
 use super::Run;
 use super::args::{self, Threads};
 use super::exit::{Exit, Failure};
-use super::scene_file;
+use super::scene_file::{self, Moment};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -25,7 +25,7 @@ Examples:
         itself, and the colours must agree. Ends with 1 where they do not."
 )]
 pub struct Args {
-    /// Scene file: .toml, .nff or .nff.gz
+    /// Scene file (.toml, .nff, .nff.gz), or atoms (.xyz, .lammpstrj, .data, .pdb, .sdf, ... or with .gz)
     scene: PathBuf,
     /// Seconds that the reference may take; where that is too short, a part of the pixels is drawn
     #[arg(long, value_name = "S", default_value = "60", value_parser = args::limit)]
@@ -41,6 +41,8 @@ pub struct Args {
     seed: u64,
     #[command(flatten)]
     threads: Threads,
+    #[command(flatten)]
+    moment: Moment,
     /// Print the result as JSON
     #[arg(long)]
     json: bool,
@@ -48,7 +50,7 @@ pub struct Args {
 
 pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
     run.warn_of_build();
-    let mut scene = scene_file::load(&args.scene, run)?.scene;
+    let mut scene = args.moment.load(&args.scene, args.resolution, run)?.scene;
     scene_file::resize(&mut scene, args.resolution);
     scene_file::need_memory(&scene, 0, "the check of this scene")?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads.count()).build();

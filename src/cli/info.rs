@@ -10,16 +10,17 @@ use octray::plan::InvalidScene;
 use octray::plan::Kind;
 use octray::render::RenderError;
 use octray::scene::{
-    Backdrop, Falloff, Filter, FilterKind, Integrator, Lens, Light, Material, Model, SCHEMA, Scene, Source, Texture,
-    TextureKind, Visible,
+    Backdrop, Falloff, Filter, FilterKind, Frames, Integrator, Lens, Light, Material, Model, SCHEMA, Scene, Source,
+    Texture, TextureKind, Visible,
 };
-use octray::shapes::{Store, Visit};
+use octray::shapes::{Part, Store, Visit};
 use octray::{Tracer, scene};
 use serde_json::{Map, Value, json};
 
 use super::Run;
 use super::exit::{Exit, Failure};
-use super::{scene_file, system};
+use super::scene_file::{self, Moment};
+use super::system;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -31,9 +32,11 @@ Examples:
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// Scene file: .toml, .nff or .nff.gz
+    /// Scene file (.toml, .nff, .nff.gz), or atoms (.xyz, .lammpstrj, .data, .pdb, .sdf, ... or with .gz)
     #[arg(required_unless_present = "schema")]
     scene: Option<PathBuf>,
+    #[command(flatten)]
+    moment: Moment,
     /// Print it as JSON
     #[arg(long)]
     json: bool,
@@ -47,9 +50,15 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
         run.console.print(SCHEMA)?;
         return Ok(Exit::Done);
     };
-    let loaded = scene_file::load(path, run)?;
+    let loaded = args.moment.load(path, None, run)?;
     scene_file::need_memory(&loaded.scene, 0, "the tree of this scene")?;
-    let info = info(path, &loaded.scene, loaded.seconds).map_err(RenderError::from)?;
+    let mut info = info(path, &loaded.scene, loaded.seconds).map_err(RenderError::from)?;
+    // A later frame that is broken is not what was asked for, but worth a word.
+    let frames = Frames::new(path).count().unwrap_or_else(|errors| {
+        run.console.warn(&errors.to_string());
+        None
+    });
+    info["frames"] = json!(frames);
     if args.json {
         run.console.print_json(&info)?
     } else {
@@ -68,6 +77,7 @@ fn info(path: &Path, scene: &Scene, load_seconds: f64) -> Result<Value, InvalidS
         "schema": 1,
         "octray": env!("CARGO_PKG_VERSION"),
         "scene": path.display().to_string(),
+        "frames": null,
         "primitives": primitives(scene),
         "bounds": bounds(&tracer),
         "materials": list(scene.materials.iter().enumerate().map(|entry| material(scene, entry)).collect()),
@@ -117,8 +127,8 @@ struct BoundsOf;
 
 impl Visit for BoundsOf {
     type Output = Option<(DVec3, DVec3)>;
-    fn visit<S: Store>(self, store: &S) -> Self::Output {
-        store.parts().iter().map(S::bounds).reduce(join)
+    fn visit<P: Part>(self, store: &Store<P>) -> Self::Output {
+        store.parts().iter().map(P::bounds).reduce(join)
     }
 }
 
@@ -211,6 +221,9 @@ fn page(info: &Value) -> String {
         let _ = writeln!(page, "{name:<11} {text}");
     };
     line("scene", word(&info["scene"]));
+    if let Some(frames) = info["frames"].as_u64() {
+        line("frames", frames.to_string());
+    }
     let kinds = info["primitives"].as_object().into_iter().flatten().filter(|(kind, _)| *kind != "total");
     let kinds: Vec<_> = kinds.map(|(kind, count)| format!("{count} {kind}")).collect();
     let kinds = if kinds.is_empty() { String::new() } else { format!(": {}", kinds.join(", ")) };

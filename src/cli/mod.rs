@@ -7,18 +7,20 @@
 //! | file | what it is about |
 //! |---|---|
 //! | `render`, `info`, `check`, `compare`, `query`, `convert`, `manual` | one command each (`manual`: two) |
-//! | `args` | words that several commands understand |
+//! | `args`, `atoms`, `frames` | words that several commands understand |
 //! | `scene_file`, `pictures`, `hits` | files in and out |
 //! | `console`, `progress`, `stats_json` | what is said, to people and machines |
 //! | `cpu`, `system`, `signals`, `exit` | the world around the process |
 
 mod args;
+mod atoms;
 mod check;
 mod compare;
 mod console;
 mod convert;
 pub mod cpu;
 mod exit;
+mod frames;
 mod hits;
 mod info;
 mod manual;

@@ -3,13 +3,14 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use octray::Query;
 use octray::render::Engine;
+use octray::{Batch, Query};
 use serde_json::json;
 
 use super::Run;
 use super::args::{EngineName, StatsFile, Threads};
 use super::exit::{Exit, Failure};
+use super::scene_file::Moment;
 use super::stats_json::{self, Seconds};
 use super::{hits, pictures, scene_file, system};
 
@@ -33,7 +34,7 @@ Examples:
         --any it gets N booleans: does the ray meet anything?"
 )]
 pub struct Args {
-    /// Scene file: .toml, .nff or .nff.gz
+    /// Scene file (.toml, .nff, .nff.gz), or atoms (.xyz, .lammpstrj, .data, .pdb, .sdf, ... or with .gz)
     scene: PathBuf,
     /// Rays, .npy
     rays: PathBuf,
@@ -48,7 +49,9 @@ pub struct Args {
     any: bool,
     #[command(flatten)]
     threads: Threads,
-    /// Trace so many times over, for the clock; the fastest time counts
+    #[command(flatten)]
+    moment: Moment,
+    /// Trace so many times over, for the clock; the median counts
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     repeat: u32,
     #[command(flatten)]
@@ -59,7 +62,7 @@ pub struct Args {
 #[derive(Debug, Clone, Copy)]
 struct Times {
     wall: f64,
-    /// All threads together, mean of all repeats, since that clock is coarse.
+    /// All threads together.
     cpu: Option<f64>,
 }
 
@@ -73,7 +76,7 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
     if let Some(stats) = &args.stats.stats {
         run.check_output(stats, &[&args.scene, &args.rays, &args.output])?;
     }
-    let loaded = scene_file::load(&args.scene, run)?;
+    let loaded = args.moment.load(&args.scene, None, run)?;
     let rays = hits::read_rays(&args.rays)?;
     let memory = RAY_BYTES.saturating_mul(rays.len() as u64);
     scene_file::need_memory(&loaded.scene, memory, &format!("the query of {} rays", rays.len()))?;
@@ -81,12 +84,17 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
     let building = Instant::now();
     let query = Query::new(&loaded.scene, Engine::from(args.engine), args.threads.count())?;
     let build = building.elapsed().as_secs_f64();
-    let (bytes, met, times) = if args.any {
-        let (answers, times) = timed(args.repeat, || query.occluded(&rays));
-        (hits::bools_file(&answers), answers.iter().filter(|met| **met).count(), times)
+    let (count, batch) = (rays.len(), Batch::new(rays));
+    let (bytes, met, counts, times) = if args.any {
+        let mut dark = vec![0; batch.tiles()];
+        let (counts, times) = timed(args.repeat, || query.find_occluded(&batch, &mut dark));
+        let answers = batch.unpack(&dark);
+        (hits::bools_file(&answers), answers.iter().filter(|met| **met).count(), counts, times)
     } else {
-        let (answers, times) = timed(args.repeat, || query.closest(&rays));
-        (hits::hits_file(&answers), answers.iter().flatten().count(), times)
+        let mut answers = query.room(&batch);
+        let (counts, times) = timed(args.repeat, || query.find_closest(&batch, &mut answers));
+        let answers = query.hits(&batch, answers);
+        (hits::hits_file(&answers), answers.iter().flatten().count(), counts, times)
     };
     let writing = Instant::now();
     pictures::write_bytes(&args.output, &bytes, run)?;
@@ -100,33 +108,39 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
         });
         stats_json::add_memory(&mut stats, columns, tree);
         let Times { wall, cpu } = times;
-        let query = json!({ "rays": rays.len(), "hits": met, "trace_seconds": wall, "trace_cpu_seconds": cpu });
+        let query = json!({ "rays": count, "hits": met, "trace_seconds": wall, "trace_cpu_seconds": cpu });
         stats.insert("query".to_owned(), query);
+        stats_json::add_tests(&mut stats, &counts);
         stats_json::write(path, stats, run)?;
     }
-    let (millions, output) = (rays.len() as f64 / 1e6, args.output.display());
+    let (millions, output) = (count as f64 / 1e6, args.output.display());
     let rate = millions / times.wall.max(1e-9);
     run.console.note(&format!(
         "{output}: {met} of {} rays met something, traced in {:.3} s ({rate:.1} Mrays/s)",
-        rays.len(),
-        times.wall
+        count, times.wall
     ));
     Ok(Exit::Done)
 }
 
-/// Does something several times: the last result, the shortest wall time.
-fn timed<T>(repeat: u32, trace: impl Fn() -> T) -> (T, Times) {
-    let cpu_before = system::cpu_seconds();
-    let once = || {
-        let start = Instant::now();
-        let result = trace();
-        (result, start.elapsed().as_secs_f64())
-    };
-    let (mut result, mut wall) = once();
-    for _ in 1..repeat {
-        let (next, seconds) = once();
-        (result, wall) = (next, wall.min(seconds));
+/// Does something several times, and once before the clock starts: the last result and median times.
+fn timed<T>(repeat: u32, mut trace: impl FnMut() -> T) -> (T, Times) {
+    let mut result = None;
+    if repeat > 1 {
+        trace();
     }
-    let cpu = system::cpu_seconds().zip(cpu_before).map(|(after, before)| (after - before) / f64::from(repeat));
-    (result, Times { wall, cpu })
+    let mut once = || {
+        let (start, cpu) = (Instant::now(), system::cpu_seconds());
+        result = Some(trace());
+        let cpu = system::cpu_seconds().zip(cpu).map(|(after, before)| after - before);
+        (start.elapsed().as_secs_f64(), cpu)
+    };
+    let (wall, cpu): (Vec<f64>, Vec<Option<f64>>) = (0..repeat).map(|_| once()).unzip();
+    let times = Times { wall: median(wall), cpu: cpu.into_iter().collect::<Option<_>>().map(median) };
+    (result.expect("traced at least once"), times)
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    if values.len() % 2 == 1 { values[middle] } else { values[middle - 1].midpoint(values[middle]) }
 }

@@ -7,12 +7,14 @@ use clap::ValueEnum;
 use octray::film::Window;
 use octray::output::{Description, description};
 use octray::render::{Engine, Stats};
-use octray::scene::Integrator;
+use octray::scene::{Frames, Integrator, particles};
 use octray::{Renderer, Rendering};
 
 use super::Run;
 use super::args::{self, EngineName, StatsFile, Threads};
+use super::atoms::Atoms;
 use super::exit::{Exit, Failure};
+use super::frames::{self, FrameList};
 use super::pictures::{self, Depth, Target};
 use super::progress::Bar;
 use super::stats_json::{self, Seconds};
@@ -29,17 +31,26 @@ Examples:
   octray render fig5.toml -o draft.png --resolution 320x240 --spp 1
   octray render fig5.toml -o part.exr --crop 100,100,200,200 --stats part.json
   octray render fig5.toml -o slow.exr --engine reference     by the f64 reference
+  octray render protein.pdb -o protein.png                   atoms, without a scene
+  octray render water.xyz.gz --frames 1-100 --out-dir out    out/water.0001.exr and so on
   octray render fig5.toml -o - -q | oiiotool - -o fig5.tif   EXR to standard output";
 
 /// Arguments of `octray render`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// Scene file: .toml, .nff or .nff.gz
+    /// Scene file (.toml, .nff, .nff.gz), or atoms (.xyz, .lammpstrj, .data, .pdb, .sdf, ... or with .gz)
     scene: PathBuf,
-    /// Picture to write, .exr or .png; - is EXR to standard output [default: the scene's name with .exr, here]
+    /// Picture to write, .exr or .png; - is EXR to standard output; #### stands for the frame's number [default: the
+    /// scene's name with .exr, here]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// Directory for the pictures, made where it is missing: the scene's name with .####.exr
+    #[arg(long, value_name = "DIR", conflicts_with = "output")]
+    out_dir: Option<PathBuf>,
+    /// Frames of an animation or trajectory: 1-100, 1-100x2 (every second one), 1,5,10-20 [default: 1]
+    #[arg(long, value_name = "LIST", value_parser = frames::list, allow_hyphen_values = true)]
+    frames: Option<FrameList>,
     /// Camera of the scene, by its name [default: the first one]
     #[arg(long, value_name = "NAME")]
     camera: Option<String>,
@@ -76,6 +87,8 @@ pub struct Args {
     /// Leave out of the file what differs from run to run (date, seconds, threads); so does SOURCE_DATE_EPOCH
     #[arg(long)]
     no_date: bool,
+    #[command(flatten)]
+    atoms: Atoms,
 }
 
 /// Integrators by their names in scene files.
@@ -95,7 +108,41 @@ impl From<IntegratorName> for Integrator {
 
 pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
     run.warn_of_build();
-    let output = args.output.clone().unwrap_or_else(|| default_output(&args.scene));
+    let list = args.frames.as_ref().map_or(&[1][..], |list| &list.0);
+    let many = list.len() > 1;
+    let name = args.output_name()?;
+    let outputs: Vec<PathBuf> =
+        list.iter().map(|frame| frames::output(&name, *frame, many)).collect::<Result<_, _>>()?;
+    if many && args.stats.stats.is_some() {
+        return Err(Failure::new(Exit::Usage, "--stats is about one frame: leave it out, or --frames"));
+    }
+    let mut scenes = scene_file::frames(&args.scene, &args.atoms, args.resolution)?;
+    if !many {
+        return render(args, &mut scenes, list[0], outputs[0].clone(), run);
+    }
+    let mut failed = Vec::new();
+    for (frame, output) in list.iter().zip(outputs) {
+        if let Err(failure) = render(args, &mut scenes, *frame, output, run) {
+            run.console.error(&failure.message);
+            // What no other frame would do better ends it all.
+            if matches!(failure.exit, Exit::Usage | Exit::Cpu) {
+                return Ok(failure.exit);
+            }
+            failed.push(frame.to_string());
+        }
+    }
+    match failed.len() {
+        0 => Ok(Exit::Done),
+        count => {
+            let text = format!("{count} of {} frames failed: {}", list.len(), failed.join(", "));
+            Err(Failure::new(Exit::No, text).of(&args.scene))
+        }
+    }
+}
+
+/// Renders one frame.
+fn render(args: &Args, scenes: &mut Frames, frame: i64, output: PathBuf, run: &Run) -> Result<Exit, Failure> {
+    let start = Instant::now();
     let target = Target::new(&output, &[&args.scene], run)?;
     let options = args.depth.options(&target)?;
     if let Some(stats) = &args.stats.stats {
@@ -104,7 +151,7 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
         }
         run.check_output(stats, &[&args.scene])?;
     }
-    let loaded = scene_file::load(&args.scene, run)?;
+    let loaded = scene_file::load(scenes, &args.scene, frame, run)?;
     let mut scene = loaded.scene;
     scene_file::resize(&mut scene, args.resolution);
     if let Some(name) = args.integrator {
@@ -115,7 +162,7 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
     let window = args.crop.unwrap_or(Window::full((image.width, image.height)));
     let work = format!("a picture of {}x{} pixels", window.width(), window.height());
     scene_file::need_memory(&scene, PIXEL_BYTES.saturating_mul(window.area() as u64), &work)?;
-    if args.output.is_none() {
+    if args.output.is_none() && args.out_dir.is_none() {
         run.console.note(&format!("octray: no -o given: the picture goes to {target}"));
     }
 
@@ -124,7 +171,7 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
     drop(bar);
     let stats = &rendering.stats;
     let writing = Instant::now();
-    let picture = args.description(&renderer, stats);
+    let picture = args.description(&renderer, stats, frame);
     pictures::write(&rendering.picture, &target, options, &picture, run)?;
     let seconds = Seconds {
         load: loaded.seconds,
@@ -134,11 +181,20 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
         write: writing.elapsed().as_secs_f64(),
     };
     args.write_stats(stats, &seconds, run)?;
-    run.console.note(&summary(&rendering, image.spp, &target, run));
+    run.console.note(&summary(&rendering, image.spp, &target, start));
     Ok(Exit::Done)
 }
 
 impl Args {
+    /// The name of the picture, with a place for the frame's number where there is one.
+    fn output_name(&self) -> Result<PathBuf, Failure> {
+        let name = self.output.clone().unwrap_or_else(|| default_output(&self.scene));
+        let Some(folder) = &self.out_dir else { return Ok(name) };
+        std::fs::create_dir_all(folder).map_err(|error| Failure::output(folder, &error))?;
+        let name = if self.frames.is_some() { name.with_extension("####.exr") } else { name };
+        Ok(folder.join(name))
+    }
+
     fn renderer<'s>(&self, scene: &'s octray::Scene) -> Result<Renderer<'s>, Failure> {
         let mut renderer =
             Renderer::new(scene)?.threads(self.threads.count()).skip(!self.no_skip).engine(Engine::from(self.engine));
@@ -160,7 +216,7 @@ impl Args {
         Ok(renderer)
     }
 
-    fn description(&self, renderer: &Renderer, stats: &Stats) -> Description {
+    fn description(&self, renderer: &Renderer, stats: &Stats, frame: i64) -> Description {
         let run = description::Run {
             date: SystemTime::now(),
             seconds: stats.plan_seconds + stats.build_seconds + stats.trace_seconds,
@@ -174,6 +230,7 @@ impl Args {
             camera: Some(renderer.view().clone()),
             spp: Some(renderer.image().spp),
             seed: Some(renderer.pattern()),
+            frame: self.frames.is_some().then(|| i32::try_from(frame).ok()).flatten(),
             run: dated.then_some(run),
             ..Description::default()
         }
@@ -191,15 +248,22 @@ impl Args {
 /// The scene's name with another ending, in the directory that the command was called from.
 fn default_output(scene: &Path) -> PathBuf {
     let name = scene.file_name().unwrap_or_default().to_string_lossy();
-    let stem = [".nff.gz", ".toml", ".nff"].iter().find_map(|ending| name.strip_suffix(ending));
-    PathBuf::from(format!("{}.exr", stem.unwrap_or(&name)))
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    let stem = if is_scene(scene) { name.rsplit_once('.').map(|(stem, _)| stem) } else { None };
+    PathBuf::from(format!("{}.exr", stem.unwrap_or(name)))
+}
+
+/// Whether a name ends as those of scenes and of atoms do.
+fn is_scene(path: &Path) -> bool {
+    let name = path.to_string_lossy().to_lowercase();
+    [".toml", ".nff", ".nff.gz"].iter().any(|ending| name.ends_with(ending)) || particles::Format::of(path).is_some()
 }
 
 fn total_rays(stats: &Stats) -> u64 {
     stats.rays.rays.iter().sum()
 }
 
-fn summary(rendering: &Rendering, spp: u32, target: &Target, run: &Run) -> String {
+fn summary(rendering: &Rendering, spp: u32, target: &Target, start: Instant) -> String {
     let (window, stats) = (rendering.picture.window, &rendering.stats);
     let (millions, seconds) = (total_rays(stats) as f64 / 1e6, stats.trace_seconds);
     format!(
@@ -207,7 +271,7 @@ fn summary(rendering: &Rendering, spp: u32, target: &Target, run: &Run) -> Strin
         window.width(),
         window.height(),
         millions / seconds.max(1e-9),
-        run.start.elapsed().as_secs_f64(),
+        start.elapsed().as_secs_f64(),
         system::peak_bytes().map_or_else(|| "done".to_owned(), |bytes| format!("{} of memory", system::size(bytes))),
     )
 }
@@ -218,8 +282,11 @@ mod tests {
 
     #[test]
     fn the_usual_output_is_named_after_the_scene() {
-        let names =
-            ["scenes/fig5.toml", "balls.nff.gz", "../a.b.nff", "odd"].map(|name| default_output(Path::new(name)));
-        assert_eq!(names.map(|name| name.display().to_string()), ["fig5.exr", "balls.exr", "a.b.exr", "odd.exr"]);
+        let names = ["scenes/fig5.toml", "balls.nff.gz", "../a.b.nff", "odd", "water.xyz.gz"]
+            .map(|name| default_output(Path::new(name)));
+        assert_eq!(
+            names.map(|name| name.display().to_string()),
+            ["fig5.exr", "balls.exr", "a.b.exr", "odd.exr", "water.exr"]
+        );
     }
 }

@@ -3,10 +3,13 @@
 use std::path::Path;
 use std::time::Instant;
 
+use clap::Args;
 use octray::Scene;
-use octray::scene::{CloudShapes, Filter, ImageSettings, SceneErrors, Shape};
+use octray::scene::particles::Format;
+use octray::scene::{CloudShapes, Filter, Frames, ImageSettings, SceneErrors, Shape};
 
 use super::Run;
+use super::atoms::Atoms;
 use super::exit::{Exit, Failure};
 use super::system;
 
@@ -26,10 +29,38 @@ pub struct Loaded {
     pub seconds: f64,
 }
 
-/// Reads a scene and shows its warnings.
-pub fn load(path: &Path, run: &Run) -> Result<Loaded, Failure> {
+/// Which moment of a scene is meant, and what atoms without a scene look like.
+#[derive(Debug, Clone, Args)]
+pub struct Moment {
+    /// Frame of an animation or trajectory, from 1
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true)]
+    frame: i64,
+    #[command(flatten)]
+    atoms: Atoms,
+}
+
+impl Moment {
+    /// Reads the scene at this moment and shows its warnings; its picture has the size of `resolution`, if that is
+    /// given.
+    pub fn load(&self, path: &Path, resolution: Option<(u32, u32)>, run: &Run) -> Result<Loaded, Failure> {
+        load(&mut frames(path, &self.atoms, resolution)?, path, self.frame, run)
+    }
+}
+
+/// The frames of a scene file.
+pub fn frames(path: &Path, atoms: &Atoms, resolution: Option<(u32, u32)>) -> Result<Frames, Failure> {
+    if atoms.is_given() && Format::of(path).is_none() {
+        let text =
+            "--style, --radius, --color-by, --bonds and --replicate are for files of atoms; a scene says it itself";
+        return Err(Failure::new(Exit::Usage, text).of(path));
+    }
+    Ok(Frames::new(path).look(atoms.look()).resolution(resolution))
+}
+
+/// Reads a frame and shows its warnings.
+pub fn load(frames: &mut Frames, path: &Path, frame: i64, run: &Run) -> Result<Loaded, Failure> {
     let start = Instant::now();
-    let scene = Scene::load(path).map_err(|errors| failure(path, &errors, run.console.color))?;
+    let scene = frames.scene(frame).map_err(|errors| failure(path, &errors, run.console.color))?;
     for warning in &scene.warnings {
         run.console.note(&format!("octray: {warning}"));
     }
@@ -46,7 +77,7 @@ pub fn need_memory(scene: &Scene, more: u64, work: &str) -> Result<(), Failure> 
     let clouds = scene.clouds.iter().map(|cloud| match &cloud.shapes {
         CloudShapes::Spheres(rows) => SPHERE_BYTES * rows.len(),
         CloudShapes::Polygons { corners, .. } => CORNER_BYTES * corners.len(),
-        CloudShapes::Disks(_) | CloudShapes::Boxes(..) => OTHER_BYTES * cloud.len(),
+        CloudShapes::Disks(_) | CloudShapes::Boxes(..) | CloudShapes::Cylinders(..) => OTHER_BYTES * cloud.len(),
     });
     let build: usize = objects.chain(clouds).sum();
     system::need_memory((build as u64).saturating_add(more), work)

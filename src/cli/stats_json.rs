@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use octray::accel::Counts;
 use octray::integrate::RayKind;
 use octray::plan::Kind;
 use octray::render::Stats;
@@ -56,15 +57,14 @@ pub fn add_render(stats: &mut Map<String, Value>, work: &Stats, is_reference: bo
     }
     stats.insert("rays".to_owned(), Value::Object(by_kind(&work.rays.rays)));
     stats.insert("hits".to_owned(), Value::Object(hits));
-    stats.insert("tests".to_owned(), Value::Object(tests(work)));
-    stats.insert("redecided".to_owned(), json!(work.tests.redecided));
+    add_tests(stats, &work.tests);
     stats.insert("tiles".to_owned(), json!({ "total": work.tiles, "background": work.background_tiles }));
     stats.insert("skipped".to_owned(), json!([]));
 }
 
-/// `box` counts boxes of tree nodes; the primitive of that name is `cuboid` here.
-fn tests(work: &Stats) -> Map<String, Value> {
-    let mut tests = Map::from_iter([("box".to_owned(), json!(work.tests.boxes))]);
+/// Tests done, in pairs. `box` counts boxes of tree nodes; the primitive of that name is `cuboid` here.
+pub fn add_tests(stats: &mut Map<String, Value>, counts: &Counts) {
+    let mut tests = Map::from_iter([("box".to_owned(), json!(counts.boxes))]);
     for kind in Kind::ALL {
         let name = match kind {
             Kind::Triangle | Kind::Quad | Kind::Octagon => "polygon",
@@ -72,9 +72,10 @@ fn tests(work: &Stats) -> Map<String, Value> {
             Kind::Sphere | Kind::Plane | Kind::Disk | Kind::Cylinder | Kind::Cone => kind.name(),
         };
         let before = tests.get(name).and_then(Value::as_u64).unwrap_or(0);
-        tests.insert(name.to_owned(), json!(before + work.tests.kinds[kind as usize]));
+        tests.insert(name.to_owned(), json!(before + counts.kinds[kind as usize]));
     }
-    tests
+    stats.insert("tests".to_owned(), Value::Object(tests));
+    stats.insert("redecided".to_owned(), json!(counts.redecided));
 }
 
 /// Memory so far, and what columns and tree take of it.

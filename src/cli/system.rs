@@ -4,21 +4,22 @@ use std::fs;
 
 use super::exit::{Exit, Failure};
 
-/// Clock ticks a second in `/proc`: USER_HZ, 100 on every architecture that we build for.
-const TICKS: f64 = 100.0;
-
 /// Most memory that this process held so far, in bytes.
 pub fn peak_bytes() -> Option<u64> {
     kilobytes(&fs::read_to_string("/proc/self/status").ok()?, "VmHWM:")
 }
 
 /// CPU seconds that all threads spent so far, those of the kernel included.
+#[cfg(unix)]
 pub fn cpu_seconds() -> Option<f64> {
-    let stat = fs::read_to_string("/proc/self/stat").ok()?;
-    // The second field is the name in brackets, which may hold anything; user and system time are fields 14 and 15.
-    let mut fields = stat.rsplit_once(')')?.1.split_ascii_whitespace().skip(11);
-    let mut ticks = || fields.next()?.parse::<f64>().ok();
-    Some((ticks()? + ticks()?) / TICKS)
+    let spent = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+    Some(spent.tv_sec as f64 + spent.tv_nsec as f64 * 1e-9)
+}
+
+/// CPU seconds that all threads spent so far: not known here.
+#[cfg(not(unix))]
+pub fn cpu_seconds() -> Option<f64> {
+    None
 }
 
 /// Makes sure that work will not run out of memory, where the system tells how much there is: it would

@@ -52,7 +52,7 @@ impl View {
             return (center_x, center_y);
         }
         let key = sample::pixel_key(self.seed, x, y);
-        let [a, b] = sample::pair(key, sample, sample::dimension::FILTER).map(sample::unit);
+        let [a, b] = sample::pair(key, sample, sample::dimension::FILTER);
         (center_x + self.filter.offset(a), center_y + self.filter.offset(b))
     }
 

@@ -1,6 +1,6 @@
 //! Cameras: where the picture is taken from.
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
 /// A camera looks from `eye` to `target`. Its view axis is `forward = unit(target - eye)`, its image
 /// axes are `right = unit(forward x up)` and `true_up = right x forward`.
@@ -36,6 +36,13 @@ pub enum Lens {
 }
 
 impl Camera {
+    /// The eye after a turn of so many degrees about `up` through the target, counter-clockwise seen from above.
+    pub fn orbited(&self, degrees: f64) -> DVec3 {
+        let angle = degrees.rem_euclid(360.0).to_radians();
+        let turn = DQuat::from_axis_angle(self.up.normalize(), angle);
+        if angle == 0.0 { self.eye } else { self.target + turn * (self.eye - self.target) }
+    }
+
     /// `(right, true_up, forward)`, each of unit length.
     pub fn axes(&self) -> (DVec3, DVec3, DVec3) {
         let forward = (self.target - self.eye).normalize();

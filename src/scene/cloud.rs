@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use glam::{DQuat, DVec3};
 
-use super::{Cuboid, Disk, Polygon, Primitive, Shape, Sphere};
+use super::{Cuboid, Cylinder, Disk, Polygon, Primitive, Shape, Sphere};
 
 /// Many primitives of one kind; row `i` is one primitive.
 #[derive(Debug, Clone)]
@@ -30,6 +30,8 @@ pub enum CloudShapes {
     Disks(Rows<7>),
     /// min, max; all turned alike, each about its centre, where a group turns them.
     Boxes(Rows<6>, Option<DQuat>),
+    /// Base, apex, radius; whether the ends of all are closed.
+    Cylinders(Rows<7>, bool),
     /// Corners in order, and where each polygon starts in them: N + 1 entries, the last one their count.
     Polygons {
         /// x y z of each corner.
@@ -113,6 +115,7 @@ impl CloudShapes {
             CloudShapes::Spheres(rows) => rows.len(),
             CloudShapes::Disks(rows) => rows.len(),
             CloudShapes::Boxes(rows, _) => rows.len(),
+            CloudShapes::Cylinders(rows, _) => rows.len(),
             CloudShapes::Polygons { starts, .. } => starts.len().saturating_sub(1),
         }
     }
@@ -137,6 +140,11 @@ impl CloudShapes {
             CloudShapes::Boxes(rows, rotation) => {
                 let [a, b, c, x, y, z] = rows.row(i);
                 Shape::Box(Cuboid { min: DVec3::new(a, b, c), max: DVec3::new(x, y, z), rotation: *rotation })
+            }
+            CloudShapes::Cylinders(rows, caps) => {
+                let [a, b, c, x, y, z, radius] = rows.row(i);
+                let (base, apex) = (DVec3::new(a, b, c), DVec3::new(x, y, z));
+                Shape::Cylinder(Cylinder { base, apex, radius, caps: *caps })
             }
             CloudShapes::Polygons { corners, starts } => {
                 let range = starts[i] as usize..starts[i + 1] as usize;

@@ -19,6 +19,8 @@ pub const SPHERES: [&str; 4] = ["x", "y", "z", "r"];
 pub const DISKS: [&str; 7] = ["x", "y", "z", "r", "nx", "ny", "nz"];
 /// Columns of a cloud of boxes.
 pub const BOXES: [&str; 6] = ["min_x", "min_y", "min_z", "max_x", "max_y", "max_z"];
+/// Columns of a cloud of cylinders.
+pub const CYLINDERS: [&str; 7] = ["base_x", "base_y", "base_z", "apex_x", "apex_y", "apex_z", "r"];
 /// Columns of the corners of polygons.
 pub const CORNERS: [&str; 3] = ["x", "y", "z"];
 /// Columns of colours.

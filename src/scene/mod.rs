@@ -6,15 +6,20 @@
 //! the sampler. Group transforms are applied when a scene is read, so all geometry here is in world
 //! coordinates. What each part means for the picture is said beside its type, once, for both.
 
+mod animation;
 mod background;
 mod camera;
 mod cloud;
 pub mod cloud_file;
 pub mod error;
+mod fit;
+mod frames;
 mod image;
 mod light;
 mod material;
 pub mod nff;
+pub mod particles;
+pub mod pattern;
 pub(crate) mod picture_file;
 pub mod rules;
 mod shape;
@@ -27,10 +32,12 @@ use std::path::Path;
 
 use glam::DVec3;
 
+pub use self::animation::{Interpolation, Part, Track};
 pub use self::background::{Backdrop, Background};
 pub use self::camera::{Camera, Lens};
 pub use self::cloud::{Cloud, CloudMaterial, CloudShapes, Rows};
 pub use self::error::{Place, SceneError, SceneErrors, Warning};
+pub use self::frames::Frames;
 pub use self::image::{Filter, FilterKind, FilterTable, ImageSettings, Integrator, RenderSettings};
 pub use self::light::{Falloff, Light, Source};
 pub use self::material::{Material, Model, Paint, Visible};
@@ -65,6 +72,8 @@ pub struct Scene {
     pub clouds: Vec<Cloud>,
     /// Names of the groups; an object or cloud refers to one by index.
     pub groups: Vec<String>,
+    /// Values over time: what the file said of those that this scene has at one frame.
+    pub tracks: Vec<Track>,
     /// What the reader mended or left out.
     pub warnings: Vec<Warning>,
 }
@@ -97,18 +106,22 @@ pub struct Primitive<'a> {
 pub const SCHEMA: &str = include_str!("schema.json");
 
 impl Scene {
-    /// Reads a scene file, its kind by its extension: `.toml` with all files that it names, `.nff`, `.nff.gz`.
+    /// Reads a scene file, its kind by its extension: `.toml` with all files that it names, `.nff`, `.nff.gz`, or a
+    /// file of atoms ([`particles::Format`]), which gets a camera, lights and a background. What is animated is read
+    /// at frame 1.
     ///
     /// # Errors
     /// All mistakes of all files; each with its place.
     pub fn load(path: impl AsRef<Path>) -> Result<Scene, SceneErrors> {
-        let path = path.as_ref();
-        let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
-        match extension.as_deref() {
-            Some("toml") => toml::load(path),
-            Some("nff" | "gz") => nff::load(path),
-            _ => Err(SceneError::of_file(path, "a scene file must end in .toml, .nff or .nff.gz", "").into()),
-        }
+        Scene::load_frame(path, 1)
+    }
+
+    /// Reads a scene file at a frame; [`Frames`] reads several of one file, and common parts once.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub fn load_frame(path: impl AsRef<Path>, frame: i64) -> Result<Scene, SceneErrors> {
+        Frames::new(path).scene(frame)
     }
 
     /// Reads a scene in TOML; its relative paths start at `base_dir`.
@@ -116,7 +129,7 @@ impl Scene {
     /// # Errors
     /// As [`Scene::load`].
     pub fn from_toml(text: &str, base_dir: &Path) -> Result<Scene, SceneErrors> {
-        toml::from_text(text, base_dir)
+        toml::from_text(text, base_dir).map(frames::Draft::finish)
     }
 
     /// How many primitives the scene has: objects, then the rows of each cloud.

@@ -109,6 +109,6 @@ fn linear(image: DynamicImage, color_space: ColorSpace) -> Vec<Texel> {
 /// The inverse of the piecewise sRGB curve; beyond 1 it goes on.
 ///
 /// Source: IEC 61966-2-1:1999, section 5.2.
-fn linear_from_srgb(value: f64) -> f64 {
+pub(super) fn linear_from_srgb(value: f64) -> f64 {
     if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
 }

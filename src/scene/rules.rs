@@ -14,6 +14,8 @@ use super::{Camera, Lens, Shape};
 
 /// Largest size of a coordinate or length: its square still fits an f32.
 pub const LARGEST: f64 = 1e15;
+/// Most primitives of a scene: their indices are stored as i32.
+pub const MOST_PRIMITIVES: usize = i32::MAX as usize;
 /// Shortest direction, normal or axis: the square of its length still is a normal f64.
 const SHORTEST: f64 = 1e-100;
 /// Largest value of a colour, radiance or intensity: products of two still fit an f32.

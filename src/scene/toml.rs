@@ -8,9 +8,11 @@
 mod clouds;
 mod files;
 mod groups;
+mod keyed;
 mod lights;
 mod looks;
 mod names;
+mod particles;
 mod settings;
 mod shapes;
 mod table;
@@ -20,68 +22,72 @@ use std::path::Path;
 
 use self::files::Texts;
 use self::groups::Transform;
-use self::looks::Pictures;
 use self::names::Names;
 use self::table::{Context, Item, Table};
-use crate::scene::{Scene, SceneErrors};
+use crate::scene::frames::{Draft, OpenCamera, Store};
+use crate::scene::{Object, Part, Scene, SceneErrors, Shape, Track};
 
-/// Primitives of a scene: their indices are stored as i32.
-const MOST_PRIMITIVES: usize = i32::MAX as usize;
+/// Keys of single parts that a scene keeps in another form: what is in lists or tables, and what has two forms.
+const CHANGED: &[&str] = &["corners", "uvs", "normals", "colors", "axis", "angle", "quaternion", "offset", "size"];
 
-/// Reads a scene file and all that it names.
+/// Reads a scene file and all that it names at a frame.
 ///
 /// # Errors
 /// Every rule that any of the files breaks.
-pub fn load(path: &Path) -> Result<Scene, SceneErrors> {
-    read(|texts| texts.load(path))
+pub(super) fn load(path: &Path, frame: i64, store: &mut Store) -> Result<Draft, SceneErrors> {
+    read(frame, store, |texts| texts.load(path))
 }
 
 /// Reads a scene from text; its relative paths start at `base_dir`.
 ///
 /// # Errors
 /// As [`load`]; places in the text are in a file named `<text>`.
-pub fn from_text(text: &str, base_dir: &Path) -> Result<Scene, SceneErrors> {
-    read(|texts| texts.add(Path::new("<text>"), base_dir, text))
+pub(super) fn from_text(text: &str, base_dir: &Path) -> Result<Draft, SceneErrors> {
+    read(1, &mut Store::default(), |texts| texts.add(Path::new("<text>"), base_dir, text))
 }
 
-fn read(start: impl FnOnce(&mut Texts)) -> Result<Scene, SceneErrors> {
-    let mut texts = Texts::default();
+fn read(frame: i64, store: &mut Store, start: impl FnOnce(&mut Texts)) -> Result<Draft, SceneErrors> {
+    let mut texts = Texts::new(frame);
     start(&mut texts);
     let files = texts.parse();
     let roots = files.iter().map(|file| Context { file, log: &texts.log }.root());
-    let scene = Reader::new(roots.collect()).scene();
+    let draft = Reader::new(roots.collect(), store).draft();
     drop(files);
     let (errors, warnings) = texts.log.into_parts();
-    if errors.is_empty() { Ok(Scene { warnings, ..scene }) } else { Err(errors) }
+    let Draft { scene, cameras } = draft;
+    if errors.is_empty() { Ok(Draft { scene: Scene { warnings, ..scene }, cameras }) } else { Err(errors) }
 }
 
 /// What is known of a scene while its files are read.
-struct Reader<'a> {
+struct Reader<'a, 's> {
     /// The top-level tables in merge order.
     roots: Vec<Table<'a>>,
     materials: Names,
     textures: Names,
     groups: Names,
     transforms: Vec<Transform>,
-    pictures: Pictures,
+    store: &'s mut Store,
     scene: Scene,
+    /// Cameras that are placed when all of the scene is known.
+    cameras: Vec<OpenCamera>,
 }
 
-impl<'a> Reader<'a> {
-    fn new(roots: Vec<Table<'a>>) -> Self {
+impl<'a, 's> Reader<'a, 's> {
+    fn new(roots: Vec<Table<'a>>, store: &'s mut Store) -> Self {
         Reader {
             roots,
             materials: Names::new("material"),
             textures: Names::new("texture"),
             groups: Names::new("group"),
             transforms: Vec::new(),
-            pictures: Pictures::default(),
+            store,
             scene: Scene::default(),
+            cameras: Vec::new(),
         }
     }
 
     /// The scene, which counts only if nothing was noted in the log.
-    fn scene(mut self) -> Scene {
+    fn draft(mut self) -> Draft {
         for root in &self.roots {
             read_format(root);
             root.has("include");
@@ -96,7 +102,18 @@ impl<'a> Reader<'a> {
             root.finish();
         }
         self.scene.groups = self.groups.into_list();
-        self.scene
+        Draft { scene: self.scene, cameras: self.cameras }
+    }
+
+    /// Ends the reading of a part: the values over time since the last one are its own, if it keeps them as they are
+    /// written.
+    fn claim(&mut self, part: Option<Part>) {
+        let tracks = self.roots.first().map(|root| root.context.log.take_tracks()).unwrap_or_default();
+        self.scene.tracks.extend(tracks.into_iter().map(|track| {
+            let is_box = matches!(part, Some(Part::Shape(last)) if self.scene.objects.get(last).is_some_and(is_box));
+            let changed = CHANGED.contains(&track.key) || is_box && track.key == "center";
+            Track { part: part.filter(|_| !changed), ..track }
+        }));
     }
 
     /// The tables of `[[key]]` of all files.
@@ -121,6 +138,10 @@ impl<'a> Reader<'a> {
         let transform = group.and_then(|group| self.transforms.get(group)).copied();
         Some((group, transform.unwrap_or_default()))
     }
+}
+
+fn is_box(object: &Object) -> bool {
+    matches!(object.shape, Shape::Box(_))
 }
 
 /// The format that this version reads is 1, which a file without the key has.

@@ -1,11 +1,12 @@
 //! `[[clouds]]`: what the table says, with the files that [`cloud_file`] reads.
 
+use super::Reader;
+use super::groups::Transform;
 use super::shapes::after_group;
 use super::table::{Item, Table};
-use super::values::{NamedFile, file, list, text};
-use super::{MOST_PRIMITIVES, Reader};
+use super::values::{NamedFile, file, flag, list, text};
 use crate::scene::cloud_file;
-use crate::scene::rules::{self, Broken, Rule, polygon};
+use crate::scene::rules::{self, Broken, MOST_PRIMITIVES, Rule, polygon};
 use crate::scene::{Cloud, CloudMaterial, CloudShapes, Polygon, Rows};
 use glam::DVec3;
 
@@ -14,30 +15,42 @@ enum Kind {
     Spheres,
     Disks,
     Boxes,
+    Cylinders,
     Polygons,
+    Particles,
 }
 
-const KINDS: &[(&str, Kind)] =
-    &[("spheres", Kind::Spheres), ("disks", Kind::Disks), ("boxes", Kind::Boxes), ("polygons", Kind::Polygons)];
+const KINDS: &[(&str, Kind)] = &[
+    ("spheres", Kind::Spheres),
+    ("disks", Kind::Disks),
+    ("boxes", Kind::Boxes),
+    ("cylinders", Kind::Cylinders),
+    ("polygons", Kind::Polygons),
+    ("particles", Kind::Particles),
+];
 
-impl<'a> Reader<'a> {
+impl<'a> Reader<'a, '_> {
     /// Reads all clouds.
     pub fn read_clouds(&mut self) {
         let mut primitives = self.scene.objects.len();
-        for table in self.tables("clouds", "cloud") {
+        for (index, mut table) in self.tables("clouds", "cloud").into_iter().enumerate() {
             let (context, span) = (table.context, table.span.clone());
-            let Some(cloud) = self.cloud(table) else { continue };
-            primitives = primitives.saturating_add(cloud.len());
+            let Some(kind) = table.kind(KINDS, &[]) else { continue };
+            let clouds = match kind {
+                Kind::Particles => self.particles(table, index).unwrap_or_default(),
+                _ => self.cloud(table, kind).into_iter().collect(),
+            };
+            primitives = primitives.saturating_add(clouds.iter().map(Cloud::len).sum());
             if primitives > MOST_PRIMITIVES {
                 context.fail(&span, "a scene must have at most 2^31 - 1 primitives", primitives.to_string());
                 return;
             }
-            self.scene.clouds.push(cloud);
+            self.scene.clouds.extend(clouds);
         }
+        self.claim(None);
     }
 
-    fn cloud(&self, mut table: Table<'a>) -> Option<Cloud> {
-        let kind = table.kind(KINDS, &[])?;
+    fn cloud(&self, table: Table<'a>, kind: Kind) -> Option<Cloud> {
         let shapes = table.need("file", |item| {
             let rows = named(item)?;
             match kind {
@@ -49,6 +62,11 @@ impl<'a> Reader<'a> {
                     let rows = rows.read(|path| cloud_file::rows(path, cloud_file::BOXES))?;
                     Some(CloudShapes::Boxes(rows, None))
                 }
+                Kind::Cylinders => {
+                    let rows = rows.read(|path| cloud_file::rows(path, cloud_file::CYLINDERS))?;
+                    Some(CloudShapes::Cylinders(rows, table.or("caps", true, flag)?))
+                }
+                Kind::Particles => None, // read elsewhere
                 Kind::Polygons => {
                     let corners = rows.read(|path| cloud_file::rows(path, cloud_file::CORNERS))?;
                     let starts = table.need("sizes", |item| starts(&named(item)?, corners.len()))?;
@@ -57,23 +75,16 @@ impl<'a> Reader<'a> {
             }
         });
         // Known as a key even where the corners are broken.
-        let _ = matches!(kind, Kind::Polygons) && table.has("sizes");
-        let shapes = shapes.and_then(|shapes| check(&table, shapes));
+        let _ = matches!(kind, Kind::Polygons) && table.has("sizes")
+            || matches!(kind, Kind::Cylinders) && table.has("caps");
         let len = shapes.as_ref().map(CloudShapes::len);
         let material = self.cloud_material(&table, len);
         let colors = table.maybe("colors", |item| colors(&named(item)?, len));
         let name = table.maybe("name", text);
         let group = self.group(&table);
-        let placed = shapes.zip(group).and_then(|(shapes, (group, transform))| {
-            let moved = transform.cloud(shapes);
-            if !transform.is_identity()
-                && let Some((row, broken)) = look_at(&moved).first
-            {
-                let broken = after_group(broken);
-                return table.broken(Broken { rule: format!("row {row} {}", broken.rule).into(), ..broken });
-            }
-            Some((moved, group))
-        });
+        let placed = shapes
+            .zip(group)
+            .and_then(|(shapes, (group, transform))| checked(&table, shapes, &transform).map(|shapes| (shapes, group)));
         table.finish();
         let (shapes, group) = placed?;
         Some(Cloud { shapes, material: material?, colors: colors?, name: name?, group })
@@ -107,13 +118,26 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// A file with the place that names it.
-struct Column<'i, 'a> {
-    item: &'i Item<'a>,
-    file: NamedFile,
+/// The shapes without needless corners, where the group puts them, if they keep all rules there and before.
+pub fn checked(table: &Table<'_>, shapes: CloudShapes, transform: &Transform) -> Option<CloudShapes> {
+    let shapes = check(table, shapes)?;
+    let moved = transform.cloud(shapes);
+    if !transform.is_identity()
+        && let Some((row, broken)) = look_at(&moved).first
+    {
+        let broken = after_group(broken);
+        return table.broken(Broken { rule: format!("row {row} {}", broken.rule).into(), ..broken });
+    }
+    Some(moved)
 }
 
-fn named<'i, 'a>(item: &'i Item<'a>) -> Option<Column<'i, 'a>> {
+/// A file with the place that names it.
+pub struct Column<'i, 'a> {
+    item: &'i Item<'a>,
+    pub file: NamedFile,
+}
+
+pub fn named<'i, 'a>(item: &'i Item<'a>) -> Option<Column<'i, 'a>> {
     file(item).map(|file| Column { item, file })
 }
 
@@ -122,7 +146,8 @@ impl Column<'_, '_> {
         read(&self.file.path).map_or_else(|broken| self.broken(&broken.rule, broken.found), Some)
     }
 
-    fn broken<T>(&self, rule: &str, found: String) -> Option<T> {
+    /// Notes what is wrong with the file; always `None`.
+    pub fn broken<T>(&self, rule: &str, found: String) -> Option<T> {
         self.item.context.fail(&self.item.span, format!("{} {rule}", self.file.shown), found);
         None
     }

@@ -20,8 +20,9 @@ const DEEPEST: usize = 16;
 const MOST_FILES: usize = 1000;
 
 /// The texts of a scene in merge order: the files that a file includes come before it.
-#[derive(Default)]
 pub struct Texts {
+    /// The frame that is being read.
+    frame: i64,
     /// Each with the directory in which its relative paths start.
     texts: Vec<(Source, PathBuf)>,
     pub log: Log,
@@ -32,6 +33,11 @@ pub struct Texts {
 }
 
 impl Texts {
+    /// None yet, to be read at a frame.
+    pub fn new(frame: i64) -> Self {
+        Texts { frame, texts: Vec::new(), log: Log::default(), open: Vec::new(), included: HashMap::new() }
+    }
+
     /// Reads the file that the user named, and what it includes.
     pub fn load(&mut self, path: &Path) {
         match read_text(path) {
@@ -57,13 +63,13 @@ impl Texts {
 
     /// All files, parsed.
     pub fn parse(&self) -> Vec<File<'_>> {
-        self.texts.iter().map(|(source, dir)| parse(source, dir, Some(&self.log))).collect()
+        self.texts.iter().map(|(source, dir)| parse(source, dir, self.frame, Some(&self.log))).collect()
     }
 
     fn include(&mut self, source: &Source, dir: &Path) {
         let log = std::mem::take(&mut self.log);
         let mut wanted = Vec::new();
-        let file = parse(source, dir, None);
+        let file = parse(source, dir, self.frame, None);
         let context = Context { file: &file, log: &log };
         if let Some(item) = Table::new(context, "", &file.root, 0..0).item("include") {
             let read = |item: &Item<'_>| values::file(item).map(|named| (named, item.span.clone()));
@@ -99,7 +105,7 @@ impl Texts {
 }
 
 /// Parses a text; its mistakes go to the log, if there is one.
-fn parse<'t>(source: &'t Source, dir: &Path, log: Option<&Log>) -> File<'t> {
+fn parse<'t>(source: &'t Source, dir: &Path, frame: i64, log: Option<&Log>) -> File<'t> {
     let (root, mistakes) = DeTable::parse_recoverable(source.text());
     let mut broken_lines = Vec::new();
     for mistake in mistakes {
@@ -116,7 +122,7 @@ fn parse<'t>(source: &'t Source, dir: &Path, log: Option<&Log>) -> File<'t> {
         }
     }
     broken_lines.sort_unstable();
-    File { source, dir: dir.to_path_buf(), root: root.into_inner(), broken_lines }
+    File { source, dir: dir.to_path_buf(), root: root.into_inner(), frame, broken_lines }
 }
 
 /// The text of a file, or why it cannot be had.

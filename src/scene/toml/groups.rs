@@ -21,7 +21,7 @@ impl Default for Transform {
     }
 }
 
-impl Reader<'_> {
+impl Reader<'_, '_> {
     /// Reads `[[groups]]`.
     pub fn read_groups(&mut self) {
         for table in self.tables("groups", "group") {
@@ -40,6 +40,7 @@ impl Reader<'_> {
             }
             table.finish();
         }
+        self.claim(None);
     }
 }
 
@@ -129,6 +130,13 @@ impl Transform {
                     [min.x, min.y, min.z, max.x, max.y, max.z]
                 });
                 CloudShapes::Boxes(rows, self.rotation.map(|turn| rotation.map_or(turn, |own| turn * own)).or(rotation))
+            }
+            CloudShapes::Cylinders(rows, caps) => {
+                let rows = changed(&rows, |row| {
+                    let (a, b) = (self.point(triple(&row, 0)), self.point(triple(&row, 3)));
+                    [a.x, a.y, a.z, b.x, b.y, b.z, row[6] * self.scale]
+                });
+                CloudShapes::Cylinders(rows, caps)
             }
             CloudShapes::Polygons { corners, starts } => {
                 CloudShapes::Polygons { corners: changed(&corners, |row| self.point(row.into()).to_array()), starts }

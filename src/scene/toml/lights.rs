@@ -5,7 +5,7 @@ use super::names::Names;
 use super::table::Table;
 use super::values::{choice, color, direction, flag, number, point, text};
 use crate::scene::rules::Rule;
-use crate::scene::{Falloff, Light, Source};
+use crate::scene::{Falloff, Light, Part, Source};
 
 #[derive(Clone, Copy)]
 enum Kind {
@@ -18,13 +18,15 @@ const KINDS: &[(&str, Kind)] = &[("point", Kind::Point), ("directional", Kind::D
 const LATER: &str = "area lights are not in this version: use \"point\", \"directional\" or \"spot\"";
 const FALLOFFS: &[(&str, Falloff)] = &[("inverse-square", Falloff::InverseSquare), ("none", Falloff::None)];
 
-impl Reader<'_> {
+impl Reader<'_, '_> {
     /// Reads all lights.
     pub fn read_lights(&mut self) {
         let mut names = Names::new("light");
         for table in self.tables("lights", "light") {
             let light = light(table, &mut names);
+            let part = Part::Light(self.scene.lights.len());
             self.scene.lights.extend(light);
+            self.claim(Some(part));
         }
     }
 }

@@ -1,21 +1,18 @@
 //! `[textures.NAME]` and `[materials.NAME]`.
 
-use std::collections::HashMap;
-use std::path::PathBuf;
+use std::convert::Infallible;
 
 use glam::DVec3;
 
 use super::Reader;
+use super::keyed::is_keyed;
 use super::table::{Item, Named, Table};
 use super::values::{NamedFile, choice, color, file, list, number, pair};
 use crate::scene::picture_file::{self, Picture};
 use crate::scene::rules::Rule;
 use crate::scene::{
-    Checker, ColorSpace, ImageTexture, Material, Model, Paint, Texture, TextureFilter, TextureKind, Visible, Wrap,
+    Checker, ColorSpace, ImageTexture, Material, Model, Paint, Part, Texture, TextureFilter, TextureKind, Visible, Wrap,
 };
-
-/// Pictures that were read: textures of the same file share their texels.
-pub type Pictures = HashMap<(PathBuf, Option<ColorSpace>), Option<Picture>>;
 
 #[derive(Clone, Copy)]
 enum Pattern {
@@ -38,7 +35,7 @@ const WRAPS: &[(&str, Wrap)] = &[("repeat", Wrap::Repeat), ("clamp", Wrap::Clamp
 const FILTERS: &[(&str, TextureFilter)] = &[("bilinear", TextureFilter::Bilinear), ("nearest", TextureFilter::Nearest)];
 const COLOR_SPACES: &[(&str, ColorSpace)] = &[("srgb", ColorSpace::Srgb), ("linear", ColorSpace::Linear)];
 
-impl<'a> Reader<'a> {
+impl<'a> Reader<'a, '_> {
     /// Reads textures and materials; all names are known before any is looked up.
     pub fn read_looks(&mut self) {
         let textures = self.named("textures", "texture");
@@ -52,12 +49,16 @@ impl<'a> Reader<'a> {
         for texture in textures {
             let name = texture.name.to_owned();
             let kind = self.texture(texture.table);
+            let part = Part::Texture(self.scene.textures.len());
             self.scene.textures.extend(kind.map(|kind| Texture { name, kind }));
+            self.claim(Some(part));
         }
         for material in materials {
             let name = material.name.to_owned();
             let material = self.material(material.table, name);
+            let part = Part::Material(self.scene.materials.len());
             self.scene.materials.extend(material);
+            self.claim(Some(part));
         }
     }
 
@@ -96,24 +97,23 @@ impl<'a> Reader<'a> {
         kind
     }
 
-    /// The picture of a file, read once.
+    /// The picture of a file, read once: textures of the same file share their texels.
     pub fn picture(&mut self, item: &Item<'a>, named: &NamedFile, space: Option<ColorSpace>) -> Option<Picture> {
-        let key = (named.path.clone(), space);
-        if let Some(known) = self.pictures.get(&key) {
-            return known.clone();
-        }
-        let picture = match picture_file::read(&named.path, space) {
-            Ok(picture) => Some(picture),
-            Err(broken) => {
-                item.context.fail(&item.span, format!("{} {}", named.shown, broken.rule), broken.found);
-                None
+        let read = || -> Result<_, Infallible> {
+            let picture = match picture_file::read(&named.path, space) {
+                Ok(picture) => Some(picture),
+                Err(broken) => {
+                    item.context.fail(&item.span, format!("{} {}", named.shown, broken.rule), broken.found);
+                    None
+                }
+            };
+            if let Some(negative) = picture.as_ref().map(|picture| picture.negative).filter(|negative| *negative > 0) {
+                item.context.warn(&item.span, format!("{} has {negative} negative values, taken for 0", named.shown));
             }
+            Ok(picture)
         };
-        if let Some(negative) = picture.as_ref().map(|picture| picture.negative).filter(|negative| *negative > 0) {
-            item.context.warn(&item.span, format!("{} has {negative} negative values, taken for 0", named.shown));
-        }
-        self.pictures.insert(key, picture.clone());
-        picture
+        let Ok(picture) = self.store.pictures.get((named.path.clone(), space), read);
+        picture.clone()
     }
 
     fn material(&mut self, mut table: Table<'a>, name: String) -> Option<Material> {
@@ -152,7 +152,7 @@ impl<'a> Reader<'a> {
 
     /// A colour, or `{ texture = "NAME" }`.
     fn paint(&self, item: &Item<'a>) -> Option<Paint> {
-        if item.value.is_array() {
+        if item.value.is_array() || is_keyed(item) {
             return color(item).map(Paint::Color);
         }
         if !item.value.is_table() {

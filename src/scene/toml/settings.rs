@@ -6,10 +6,12 @@ use super::Reader;
 use super::names::Names;
 use super::table::{Item, Table};
 use super::values::{choice, color, direction, file, flag, number, point, text, whole};
+use crate::scene::fit;
+use crate::scene::frames::OpenCamera;
 use crate::scene::rules::{self, Rule};
 use crate::scene::{
-    Backdrop, Background, Camera, Filter, FilterKind, ImageSettings, ImageTexture, Integrator, Lens, RenderSettings,
-    TextureFilter, Wrap,
+    Backdrop, Background, Camera, Filter, FilterKind, ImageSettings, ImageTexture, Integrator, Lens, Part,
+    RenderSettings, TextureFilter, Wrap,
 };
 
 /// Most pixels along one side.
@@ -34,21 +36,25 @@ const LENSES: &[(&str, LensKind)] = &[("pinhole", LensKind::Pinhole), ("orthogra
 const LATER_LENS: &str = "thin-lens and panoramic cameras are not in this version: use \"pinhole\" or \"orthographic\"";
 const LATER_LENSES: &[(&str, &str)] = &[("thin-lens", LATER_LENS), ("panoramic", LATER_LENS)];
 
-impl<'a> Reader<'a> {
+impl<'a> Reader<'a, '_> {
     /// Reads all tables that are there once.
     pub fn read_settings(&mut self) {
         self.scene.image = self.single("image").and_then(image);
+        self.claim(Some(Part::Image));
         if let Some(render) = self.single("render").and_then(render) {
             self.scene.render = render;
         }
+        self.claim(Some(Part::Render));
         self.read_cameras();
         if let Some(table) = self.single("background") {
             self.scene.background = self.background(table).unwrap_or_default();
         }
+        self.claim(Some(Part::Background));
         if let Some(table) = self.single("ambient") {
             self.scene.ambient = table.or("color", DVec3::ZERO, color).unwrap_or_default();
             table.finish();
         }
+        self.claim(Some(Part::Ambient));
     }
 
     fn read_cameras(&mut self) {
@@ -63,16 +69,28 @@ impl<'a> Reader<'a> {
             );
         }
         let mut names = Names::new("camera");
-        let cameras = lone.and_then(|table| camera(table, None)).into_iter();
-        let several = several.into_iter().filter_map(|table| {
+        if let Some(found) = lone.and_then(|table| camera(table, None)) {
+            self.add_camera(found);
+        }
+        for table in several {
             let name = table.need("name", |item| {
                 let name = text(item)?;
                 names.give(&name, table.context, &item.span)?;
                 Some(name)
             });
-            camera(table, name)
-        });
-        self.scene.cameras = cameras.chain(several).collect();
+            if let Some(found) = camera(table, name) {
+                self.add_camera(found);
+            }
+        }
+    }
+
+    fn add_camera(&mut self, (camera, Placing { framed, orbit }): (Camera, Placing)) {
+        let index = self.scene.cameras.len();
+        self.scene.cameras.push(camera);
+        if framed || orbit.is_some() {
+            self.cameras.push(OpenCamera { index, framed, orbit });
+        }
+        self.claim(Some(Part::Camera(index)));
     }
 
     fn background(&mut self, table: Table<'a>) -> Option<Background> {
@@ -174,7 +192,13 @@ fn render(table: Table<'_>) -> Option<RenderSettings> {
     Some(RenderSettings { integrator: integrator?, max_depth: max_depth? as u32, seed: seed? })
 }
 
-fn camera(mut table: Table<'_>, name: Option<String>) -> Option<Camera> {
+/// What is left to do for a camera when all of the scene is known.
+struct Placing {
+    framed: bool,
+    orbit: Option<f64>,
+}
+
+fn camera(mut table: Table<'_>, name: Option<String>) -> Option<(Camera, Placing)> {
     let kind = table.kind(LENSES, LATER_LENSES)?;
     let lens = match kind {
         LensKind::Pinhole => table.need("vfov", number(Rule::VFOV)).map(|vfov| Lens::Pinhole { vfov }),
@@ -182,11 +206,17 @@ fn camera(mut table: Table<'_>, name: Option<String>) -> Option<Camera> {
             table.need("height", number(Rule::LENGTH)).map(|height| Lens::Orthographic { height })
         }
     };
-    let (eye, target) = (table.need("eye", point), table.need("target", point));
     let up = table.or("up", DVec3::Y, direction);
+    let orbit = table.maybe("orbit", number(Rule::FINITE));
+    // Neither eye nor target: the camera is placed so that it sees everything.
+    let framed = !table.has("eye") && !table.has("target");
+    let (eye, target) = match framed {
+        true => (up.map(fit::direction), Some(DVec3::ZERO)),
+        false => (table.need("eye", point), table.need("target", point)),
+    };
     let camera = (|| Some(Camera { name, eye: eye?, target: target?, up: up?, lens: lens? }))();
     let camera = camera.and_then(|camera| match rules::camera(&camera) {
-        Ok(()) => Some(camera),
+        Ok(()) => Some((camera, Placing { framed, orbit: orbit? })),
         Err(broken) => table.broken(broken),
     });
     table.finish();

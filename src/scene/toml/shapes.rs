@@ -6,7 +6,7 @@ use super::Reader;
 use super::table::Table;
 use super::values::{direction, flag, list, number, point, rotation, size, text, uv};
 use crate::scene::rules::{self, Broken, Rule, polygon};
-use crate::scene::{Cone, Cuboid, Cylinder, Disk, Object, Plane, Polygon, Shape, Sphere};
+use crate::scene::{Cone, Cuboid, Cylinder, Disk, Object, Part, Plane, Polygon, Shape, Sphere};
 
 #[derive(Clone, Copy)]
 enum Kind {
@@ -29,12 +29,16 @@ const KINDS: &[(&str, Kind)] = &[
     ("cone", Kind::Cone),
 ];
 
-impl<'a> Reader<'a> {
+impl<'a> Reader<'a, '_> {
     /// Reads all shapes.
     pub fn read_shapes(&mut self) {
         for table in self.tables("shapes", "shape") {
             let object = self.object(table);
+            let group = object.as_ref().and_then(|object| object.group);
+            let moved = group.is_some_and(|group| !self.transforms[group].is_identity());
+            let part = Part::Shape(self.scene.objects.len());
             self.scene.objects.extend(object);
+            self.claim(Some(part).filter(|_| !moved));
         }
     }
 

@@ -10,6 +10,7 @@ use ::toml::Spanned;
 use ::toml::de::{DeString, DeTable, DeValue};
 
 use super::names;
+use crate::scene::Track;
 use crate::scene::error::{Place, SceneError, SceneErrors, Source, Warning};
 use crate::scene::rules::Broken;
 
@@ -19,6 +20,8 @@ pub struct File<'t> {
     /// Where its relative paths start.
     pub dir: PathBuf,
     pub root: DeTable<'t>,
+    /// The frame that is being read.
+    pub frame: i64,
     /// Lines on which the syntax is broken, ascending; what follows from that is not reported.
     pub broken_lines: Vec<usize>,
 }
@@ -28,6 +31,8 @@ pub struct File<'t> {
 pub struct Log {
     errors: RefCell<SceneErrors>,
     warnings: RefCell<Vec<Warning>>,
+    /// Values over time that no part has claimed yet.
+    tracks: RefCell<Vec<Track>>,
     /// A file could not be read whole, so that names may be missing through no further fault.
     pub incomplete: Cell<bool>,
 }
@@ -45,7 +50,7 @@ pub struct Item<'a> {
     pub context: Context<'a>,
     /// What the key belongs to, such as "sphere".
     owner: &'static str,
-    key: &'static str,
+    pub key: &'static str,
     pub value: &'a DeValue<'a>,
     pub span: Range<usize>,
 }
@@ -78,6 +83,20 @@ impl Log {
         self.errors.borrow_mut().add_source(source);
     }
 
+    /// Notes a value over time, for the part that is being read.
+    pub fn animate(&self, track: Track) {
+        self.tracks.borrow_mut().push(track);
+    }
+
+    /// The values over time that were noted since the last call.
+    pub fn take_tracks(&self) -> Vec<Track> {
+        self.tracks.take()
+    }
+
+    pub fn warn(&self, warning: Warning) {
+        self.warnings.borrow_mut().push(warning);
+    }
+
     pub fn count(&self) -> usize {
         self.errors.borrow().len()
     }
@@ -104,7 +123,7 @@ impl<'a> Context<'a> {
     }
 
     pub fn warn(self, span: &Range<usize>, text: String) {
-        self.log.warnings.borrow_mut().push(Warning { place: self.place(span), text });
+        self.log.warn(Warning { place: self.place(span), text });
     }
 
     /// Notes an error, but for what the parser made up while it recovered from an error of syntax.
@@ -121,6 +140,11 @@ impl<'a> Item<'a> {
     /// Such as "sphere radius".
     pub fn name(&self) -> String {
         if self.owner.is_empty() { self.key.to_owned() } else { format!("{} {}", self.owner, self.key) }
+    }
+
+    /// The same value, called as another one in messages.
+    pub fn called_as(&self, other: &Item<'a>) -> Item<'a> {
+        Item { owner: other.owner, key: other.key, ..self.clone() }
     }
 
     /// The text of the value, shortened.

@@ -5,20 +5,28 @@ use std::path::{Path, PathBuf};
 use ::toml::de::DeValue;
 use glam::{DQuat, DVec2, DVec3};
 
+use super::keyed::{at_frame, is_keyed};
 use super::table::Item;
+use crate::scene::pattern;
 use crate::scene::rules::{self, Rule};
 
-/// A number that keeps a rule.
+/// A number that keeps a rule, or keys of such.
 pub fn number(rule: Rule) -> impl Fn(&Item<'_>) -> Option<f64> + Copy {
-    move |item| {
-        let Some(x) = as_f64(item.value) else { return item.wrong("must be a number") };
-        rule.broken_by(x).map_or(Some(x), |text| item.wrong(text))
-    }
+    move |item| at_frame(item, |item| one(item, rule).map(|x| [x])).map(|[x]| x)
 }
 
-/// A whole number between two bounds.
+fn one(item: &Item<'_>, rule: Rule) -> Option<f64> {
+    let Some(x) = as_f64(item.value) else { return item.wrong("must be a number") };
+    rule.broken_by(x).map_or(Some(x), |text| item.wrong(text))
+}
+
+/// A whole number between two bounds, or keys of such; between keys it is rounded.
 pub fn whole(least: u64, most: u64) -> impl Fn(&Item<'_>) -> Option<u64> + Copy {
     move |item| {
+        if is_keyed(item) {
+            let [x] = at_frame(item, |item| whole(least, most)(item).map(|x| [x as f64]))?;
+            return Some((x.round() as u64).clamp(least, most));
+        }
         let range = || match most {
             u64::MAX => format!("must be a whole number from {least} on, at most 2^64 - 1"),
             _ => format!("must be a whole number from {least} to {most}"),
@@ -85,7 +93,12 @@ pub fn uv(item: &Item<'_>) -> Option<DVec2> {
     pair(Rule::COORDINATE)(item).map(DVec2::from_array)
 }
 
-fn numbers<const N: usize>(item: &Item<'_>, rule: Rule, what: &str) -> Option<[f64; N]> {
+/// So many numbers that keep a rule, or keys of such; `what` says how many.
+pub fn numbers<const N: usize>(item: &Item<'_>, rule: Rule, what: &str) -> Option<[f64; N]> {
+    at_frame(item, |item| plain_numbers(item, rule, what))
+}
+
+fn plain_numbers<const N: usize>(item: &Item<'_>, rule: Rule, what: &str) -> Option<[f64; N]> {
     let text = || format!("must be {what} in brackets");
     let Some(elements) = item.elements().filter(|elements| elements.len() == N) else {
         return item.wrong(&text());
@@ -93,7 +106,7 @@ fn numbers<const N: usize>(item: &Item<'_>, rule: Rule, what: &str) -> Option<[f
     let mut values = [Some(0.0); N];
     for (value, element) in values.iter_mut().zip(elements) {
         *value = match as_f64(element.value) {
-            Some(_) => number(rule)(&element),
+            Some(_) => one(&element, rule),
             None => element.wrong("must hold numbers"),
         };
     }
@@ -146,14 +159,19 @@ pub struct NamedFile {
     pub path: PathBuf,
 }
 
-/// A path, relative to the file that names it.
+/// A path, relative to the file that names it. One that stands for a file a frame is that of the frame, unless
+/// there is a file of this very name.
 pub fn file(item: &Item<'_>) -> Option<NamedFile> {
     let name = item.value.as_str().filter(|name| !name.is_empty() && !name.contains('\0'));
     let Some(name) = name else { return item.wrong("must be a path in quotes") };
-    Some(NamedFile { shown: name.to_owned(), path: item.context.file.dir.join(Path::new(name)) })
+    let place = |name: &str| item.context.file.dir.join(Path::new(name));
+    let literal = NamedFile { shown: name.to_owned(), path: place(name) };
+    let at_frame = pattern::name(name, item.context.file.frame).filter(|_| !literal.path.exists());
+    Some(at_frame.map_or(literal, |name| NamedFile { path: place(&name), shown: name }))
 }
 
-fn as_f64(value: &DeValue<'_>) -> Option<f64> {
+/// The value of a float or an integer.
+pub fn as_f64(value: &DeValue<'_>) -> Option<f64> {
     match value {
         DeValue::Float(float) => float.as_str().parse().ok(),
         DeValue::Integer(int) if int.radix() == 10 => int.as_str().parse().ok(),

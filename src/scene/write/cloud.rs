@@ -64,11 +64,15 @@ pub(super) fn table(scene: &Scene, cloud: &Cloud, files: &Files) -> io::Result<T
         CloudShapes::Spheres(_) => "spheres",
         CloudShapes::Disks(_) => "disks",
         CloudShapes::Boxes(..) => "boxes",
+        CloudShapes::Cylinders(..) => "cylinders",
         CloudShapes::Polygons { .. } => "polygons",
     };
     let mut table = Table::one_of("clouds").set("type", quoted(kind)).set("file", files.named(ROWS)?);
     if let CloudShapes::Polygons { .. } = &cloud.shapes {
         table = table.set("sizes", files.named(SIZES)?);
+    }
+    if let CloudShapes::Cylinders(_, false) = &cloud.shapes {
+        table = table.set("caps", false);
     }
     table = match &cloud.material {
         CloudMaterial::One(material) => table.set("material", quoted(&scene.materials[*material].name)),
@@ -90,6 +94,7 @@ pub(super) fn save(cloud: &Cloud, files: &Files) -> io::Result<()> {
         CloudShapes::Spheres(rows) => save_rows(rows, files),
         CloudShapes::Disks(rows) => save_rows(rows, files),
         CloudShapes::Boxes(rows, _) => save_rows(rows, files),
+        CloudShapes::Cylinders(rows, _) => save_rows(rows, files),
         CloudShapes::Polygons { corners, starts } => {
             let sizes: Vec<u32> = starts.windows(2).map(|pair| pair[1] - pair[0]).collect();
             save_array(&files.file(SIZES), &[sizes.len()], &sizes)?;

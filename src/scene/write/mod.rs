@@ -4,6 +4,9 @@
 //! transform. Rows of clouds go to `.npy` files beside the scene, in the precision they have; textures
 //! are referred to by path. Keys whose value is the usual one are left out where that reads better.
 //!
+//! Values over time are written as keys, as the scene's tracks have them. Those of groups and of what is moved by
+//! them, of points in lists and of clouds stay as they are at the frame for which the scene was read.
+//!
 //! A cloud of boxes that a group has turned has no key for its rotation. It is written as single boxes,
 //! and so are the rows of all clouds before it, or the indices of primitives would change.
 
@@ -19,7 +22,7 @@ use std::path::Path;
 use tempfile::NamedTempFile;
 
 use self::text::Table;
-use super::Scene;
+use super::{Part, Scene};
 
 /// Writes a scene to `file` and its clouds beside it, as `NAME_cloud1.npy`, `NAME_cloud1_materials.npy`,
 /// ... where NAME is that of `file` without its ending.
@@ -47,8 +50,8 @@ pub fn to_toml(scene: &Scene, file: &Path) -> io::Result<String> {
     let mut text = "format = 1\n".to_owned();
     let mut add = |table: Table| text.push_str(&table.finish());
     settings::all(scene, file, &mut add)?;
-    for object in &scene.objects {
-        add(shape::object(scene, object));
+    for (index, object) in scene.objects.iter().enumerate() {
+        add(shape::object(scene, object).over_time(scene, Part::Shape(index)));
     }
     let single = cloud::written_singly(scene);
     for cloud in &scene.clouds[..single] {

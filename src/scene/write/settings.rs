@@ -5,30 +5,37 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::text::{Table, list, number, path, quoted, vector};
+use super::text::{Table, keys, list, number, path, quoted, vector};
 use crate::scene::{
     Backdrop, Background, Camera, ColorSpace, Falloff, FilterKind, ImageSettings, Integrator, Lens, Light, Material,
-    Model, Paint, RenderSettings, Scene, Source, Texture, TextureFilter, TextureKind, Visible, Wrap,
+    Model, Paint, Part, RenderSettings, Scene, Source, Texture, TextureFilter, TextureKind, Visible, Wrap,
 };
 
 /// Adds the tables of everything but shapes and clouds.
 pub(super) fn all(scene: &Scene, file: &Path, add: &mut impl FnMut(Table)) -> io::Result<()> {
-    scene.image.iter().for_each(|settings| add(image(settings)));
-    if scene.render != RenderSettings::default() {
-        add(render(&scene.render));
+    let is_animated = |part| scene.tracks.iter().any(|track| track.part == Some(part));
+    scene.image.iter().for_each(|settings| add(image(settings).over_time(scene, Part::Image)));
+    if scene.render != RenderSettings::default() || is_animated(Part::Render) {
+        add(render(&scene.render).over_time(scene, Part::Render));
     }
-    scene.cameras.iter().for_each(|lone_or_named| add(camera(lone_or_named)));
-    if let Some(table) = background(&scene.background, file)? {
-        add(table);
+    for (index, lone_or_named) in scene.cameras.iter().enumerate() {
+        add(camera(scene, index, lone_or_named));
     }
-    if scene.ambient != DVec3::ZERO {
-        add(Table::new("ambient").set("color", vector(scene.ambient)));
+    if let Some(table) = background(&scene.background, is_animated(Part::Background), file)? {
+        add(table.over_time(scene, Part::Background));
     }
-    for named in &scene.textures {
-        add(texture(named, file)?);
+    if scene.ambient != DVec3::ZERO || is_animated(Part::Ambient) {
+        add(Table::new("ambient").set("color", vector(scene.ambient)).over_time(scene, Part::Ambient));
     }
-    scene.materials.iter().for_each(|named| add(material(scene, named)));
-    scene.lights.iter().for_each(|source| add(light(source)));
+    for (index, named) in scene.textures.iter().enumerate() {
+        add(texture(named, file)?.over_time(scene, Part::Texture(index)));
+    }
+    for (index, named) in scene.materials.iter().enumerate() {
+        add(material(scene, named).over_time(scene, Part::Material(index)));
+    }
+    for (index, source) in scene.lights.iter().enumerate() {
+        add(light(source).over_time(scene, Part::Light(index)));
+    }
     scene.groups.iter().for_each(|name| add(Table::one_of("groups").set("name", quoted(name))));
     Ok(())
 }
@@ -57,7 +64,9 @@ fn render(render: &RenderSettings) -> Table {
         .set("seed", render.seed)
 }
 
-fn camera(camera: &Camera) -> Table {
+fn camera(scene: &Scene, index: usize, camera: &Camera) -> Table {
+    let part = Part::Camera(index);
+    let orbit = scene.tracks.iter().find(|track| track.part == Some(part) && track.key == "orbit");
     let table = match &camera.name {
         Some(name) => Table::one_of("cameras").set("name", quoted(name)),
         None => Table::new("camera"),
@@ -66,13 +75,16 @@ fn camera(camera: &Camera) -> Table {
         Lens::Pinhole { vfov } => table.set("type", quoted("pinhole")).set("vfov", number(vfov)),
         Lens::Orthographic { height } => table.set("type", quoted("orthographic")).set("height", number(height)),
     };
-    table.set("eye", vector(camera.eye)).set("target", vector(camera.target)).set("up", vector(camera.up))
+    // The eye is kept as it is turned at this frame.
+    let angle = orbit.and_then(|track| track.now.first()).map_or(0.0, |angle| -angle);
+    let table = table.set("eye", vector(camera.orbited(angle))).set("target", vector(camera.target));
+    table.set("up", vector(camera.up)).set_some("orbit", orbit.map(keys)).over_time(scene, part)
 }
 
-fn background(background: &Background, file: &Path) -> io::Result<Option<Table>> {
+fn background(background: &Background, animated: bool, file: &Path) -> io::Result<Option<Table>> {
     let table = Table::new("background");
     let table = match &background.backdrop {
-        Backdrop::Color(DVec3::ZERO) if !background.transparent => return Ok(None),
+        Backdrop::Color(DVec3::ZERO) if !background.transparent && !animated => return Ok(None),
         Backdrop::Color(color) => table.set("color", vector(*color)),
         Backdrop::Gradient { top, bottom } => table.set("top", vector(*top)).set("bottom", vector(*bottom)),
         Backdrop::Image { image, scale, rotation } => {

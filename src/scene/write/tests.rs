@@ -80,6 +80,8 @@ fn clouds() -> Vec<Cloud> {
         cloud(CloudShapes::Disks(Rows::F32(vec![[0.1, 0.2, 0.3, 0.4, 0.0, 0.0, 1.0]]))),
         cloud(CloudShapes::Boxes(Rows::F32(vec![[0.0, 0.0, 0.0, 0.1, 0.2, 0.3]]), None)),
         cloud(polygons),
+        cloud(CloudShapes::Cylinders(Rows::F64(vec![[0.1, 0.2, 0.3, THIRD, 0.0, 1.0, 0.25]]), false)),
+        cloud(CloudShapes::Cylinders(Rows::F32(vec![[0.1, 0.2, 0.3, 1.0, 0.0, 1.0, 0.25]]), true)),
     ];
     clouds[0].colors = Some(vec![[0.1, 0.2, 0.3], [1.0, 0.5, 0.25]]);
     clouds[0].material = CloudMaterial::Each(vec![3, 0]);
@@ -183,9 +185,40 @@ fn every_part_of_a_scene_comes_back() {
         "all_cloud3.npy",
         "all_cloud4.npy",
         "all_cloud4_sizes.npy",
+        "all_cloud5.npy",
+        "all_cloud6.npy",
         "texel.png",
     ];
     assert_eq!(names(folder.path()), expected, "and nothing else is left");
+}
+
+/// Values over time are read again at every frame as they were.
+#[test]
+fn values_over_time_come_back() {
+    let text = "[image]\nwidth = 4\nheight = 4\nspp = { keys = [[1, 1], [3, 4]] }\n\
+        [camera]\ntype = \"pinhole\"\nvfov = { keys = [[1, 20], [9, 40]] }\neye = [4, 1, 0.5]\ntarget = [1, 0, 0]\n\
+        orbit = { keys = [[1, 30], [9, 390]] }\n\
+        [background]\ncolor = { keys = [[1, [0, 0, 0]], [9, [1, 0.5, 0]]], interpolation = \"smooth\" }\n\
+        [ambient]\ncolor = { keys = [[1, [0, 0, 0]], [9, [1, 0.5, 0]]], interpolation = \"step\" }\n\
+        [materials.a]\ntype = \"diffuse\"\nalbedo = { keys = [[1, [1, 0, 0]], [6, [0, 1, 0]]] }\n\
+        [[groups]]\nname = \"g\"\ntranslate = { keys = [[1, [0, 0, 0]], [2, [1, 0, 0]]] }\n\
+        [[lights]]\ntype = \"point\"\nposition = { keys = [[1, [0, 0, 0]], [9, [0, 10, 0]]] }\nintensity = [1, 1, 1]\n\
+        [[shapes]]\ntype = \"sphere\"\ncenter = [2, 0, 0]\nradius = { keys = [[-5, 1], [5, 2]] }\nmaterial = \"a\"\n\
+        [[shapes]]\ntype = \"box\"\ncenter = { keys = [[1, [0, 0, 0]], [2, [1, 0, 0]]] }\nsize = [1, 1, 1]\nmaterial = \"a\"\n";
+    let folder = tempfile::tempdir().unwrap();
+    let [first, second] = ["a.toml", "b.toml"].map(|name| folder.path().join(name));
+    std::fs::write(&first, text).unwrap();
+    let scene = Scene::load_frame(&first, 1).unwrap_or_else(|errors| panic!("{errors}"));
+    assert_eq!(scene.tracks.iter().filter(|track| track.part.is_none()).count(), 2, "the group and the box");
+    save(&scene, &second).unwrap();
+    for frame in [1, 2, 4, 9] {
+        let [mut want, got] = [&first, &second].map(|file| Scene::load_frame(file, frame).unwrap());
+        want.objects[1] = got.objects[1].clone();
+        let eyes = [&mut want, &mut got.clone()].map(|scene| std::mem::take(&mut scene.cameras[0].eye));
+        assert!(eyes[0].abs_diff_eq(eyes[1], 1e-14), "{eyes:?}: turned there and back");
+        want.cameras[0].eye = got.cameras[0].eye;
+        assert_same(&got, &want);
+    }
 }
 
 /// The scenes of each kind of shape that NFF has, as `octray convert` writes them.
@@ -243,7 +276,7 @@ fn turned_boxes_are_written_one_by_one_with_all_before_them() {
         table["shapes"].as_array().unwrap().iter().map(|shape| shape["type"].as_str().unwrap()).collect();
     assert_eq!(kinds, ["sphere", "sphere", "disk", "box"]);
     assert_eq!(table["shapes"][3]["rotation"]["quaternion"][1].as_float(), Some(turn.y));
-    assert_eq!(table["clouds"].as_array().map(Vec::len), Some(1));
+    assert_eq!(table["clouds"].as_array().map(Vec::len), Some(3));
 }
 
 #[test]

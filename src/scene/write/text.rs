@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
+use crate::scene::{Interpolation, Part, Scene, Track};
+
 /// One table of the file: its header and a line for each key.
 #[derive(Debug)]
 pub(super) struct Table {
@@ -43,9 +45,34 @@ impl Table {
         }
     }
 
+    /// Gives the keys that are there the values over time that a part has, instead of those of one frame.
+    pub fn over_time(mut self, scene: &Scene, part: Part) -> Self {
+        for track in scene.tracks.iter().filter(|track| track.part == Some(part)) {
+            let start = format!("{} = ", track.key);
+            let line = |line: &str| match line.starts_with(&start) {
+                true => format!("{start}{}\n", keys(track)),
+                false => format!("{line}\n"),
+            };
+            self.lines = self.lines.lines().map(line).collect();
+        }
+        self
+    }
+
     pub fn finish(self) -> String {
         self.lines
     }
+}
+
+/// `{ keys = [[1, 0.5], [24, 2]], interpolation = "smooth" }`
+pub(super) fn keys(track: &Track) -> String {
+    let value = |value: &[f64]| if let [x] = value { number(*x) } else { numbers(value) };
+    let pairs = list(track.keys.iter().map(|(frame, key)| format!("[{}, {}]", number(*frame), value(key))));
+    let interpolation = match track.interpolation {
+        Interpolation::Linear => "linear",
+        Interpolation::Smooth => "smooth",
+        Interpolation::Step => "step",
+    };
+    format!("{{ keys = {pairs}, interpolation = {} }}", quoted(interpolation))
 }
 
 /// A number by its shortest digits that read back as the same bits.

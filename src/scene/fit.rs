@@ -1,0 +1,131 @@
+//! Where a camera must stand to see a whole scene.
+
+use glam::{DVec2, DVec3};
+
+use super::{Camera, Lens, Scene, Shape};
+
+/// Room around the scene: the picture is so much larger.
+const MARGIN: f64 = 1.06;
+
+/// Where a camera stands and what it looks at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct View {
+    /// World coordinates.
+    pub eye: DVec3,
+    /// World coordinates.
+    pub target: DVec3,
+}
+
+/// The way to the eye of a camera whose `up` is given: from the front, a little from the right and from above. The
+/// front is +z, or -y where +z is up.
+pub fn direction(up: DVec3) -> DVec3 {
+    let up = up.normalize();
+    let front = if up.z.abs() < 0.9 { DVec3::Z } else { DVec3::NEG_Y };
+    let front = front.reject_from(up).normalize();
+    (front + 0.3 * up.cross(front) + 0.25 * up).normalize()
+}
+
+/// The view of everything but planes, as near as the lens and the shape of the picture (`aspect`: width over height)
+/// allow; `around`: from a distance that is right for all directions.
+pub fn view(scene: &Scene, camera: &Camera, aspect: f64, around: bool) -> View {
+    let mut balls = Vec::new();
+    scene.primitives().for_each(|primitive| bound(&primitive.shape, &mut balls));
+    let direction = direction(camera.up);
+    if balls.is_empty() {
+        return View { eye: direction, target: DVec3::ZERO };
+    }
+    let low = balls.iter().fold(DVec3::INFINITY, |low, (center, radius)| low.min(center - *radius));
+    let high = balls.iter().fold(DVec3::NEG_INFINITY, |high, (center, radius)| high.max(center + *radius));
+    let center = 0.5 * (low + high);
+    let radius = balls.iter().map(|(ball, radius)| (ball - center).length() + radius).fold(0.0, f64::max);
+    let Lens::Pinhole { vfov } = camera.lens else {
+        return View { eye: center + 3.0 * radius * direction, target: center };
+    };
+    let tan = (0.5 * vfov).to_radians().tan() / MARGIN;
+    let tans = DVec2::new(tan * aspect, tan);
+    if around {
+        let distance = radius / tans.min_element().atan().sin();
+        return View { eye: center + distance * direction, target: center };
+    }
+    let facing = Camera { eye: center + direction, target: center, ..camera.clone() };
+    tight(&balls, center, facing.axes(), tans)
+}
+
+/// The nearest place from which all balls are inside the four sides of the frustum.
+///
+/// A side with the half angle a holds a ball at (x, z) of radius r, z the way forward, if
+/// `cos a (x - eye_x) - sin a (z - eye_z) + r <= 0`; the greatest of the two opposite sides over all balls are two
+/// equations for the eye.
+fn tight(balls: &[(DVec3, f64)], center: DVec3, axes: (DVec3, DVec3, DVec3), tans: DVec2) -> View {
+    let (right, up, forward) = axes;
+    let mut eye = DVec3::new(0.0, 0.0, f64::INFINITY);
+    for (axis, sideways) in [right, up].into_iter().enumerate() {
+        let (sin, cos) = tans[axis].atan().sin_cos();
+        let (mut plus, mut minus) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+        for (ball, radius) in balls {
+            let (x, z) = ((ball - center).dot(sideways), (ball - center).dot(forward));
+            plus = plus.max(cos * x - sin * z + radius);
+            minus = minus.max(-cos * x - sin * z + radius);
+        }
+        eye[axis] = (plus - minus) / (2.0 * cos);
+        eye.z = eye.z.min(-(plus + minus) / (2.0 * sin));
+    }
+    let sideways = center + eye.x * right + eye.y * up;
+    View { eye: sideways + eye.z * forward, target: sideways }
+}
+
+/// Balls that hold a shape; planes have none.
+fn bound(shape: &Shape, balls: &mut Vec<(DVec3, f64)>) {
+    match shape {
+        Shape::Sphere(sphere) => balls.push((sphere.center, sphere.radius)),
+        Shape::Plane(_) => {}
+        Shape::Disk(disk) => balls.push((disk.center, disk.radius)),
+        Shape::Polygon(polygon) => balls.extend(polygon.corners.iter().map(|corner| (*corner, 0.0))),
+        Shape::Box(cuboid) => {
+            let (center, half) = (0.5 * (cuboid.min + cuboid.max), 0.5 * (cuboid.max - cuboid.min));
+            let turned = |corner: DVec3| cuboid.rotation.map_or(corner, |rotation| rotation * corner);
+            for corner in 0..8 {
+                let sign = |bit: u32| if corner >> bit & 1 == 0 { 1.0 } else { -1.0 };
+                balls.push((center + turned(half * DVec3::new(sign(0), sign(1), sign(2))), 0.0));
+            }
+        }
+        Shape::Cylinder(cylinder) => balls.extend([(cylinder.base, cylinder.radius), (cylinder.apex, cylinder.radius)]),
+        Shape::Cone(cone) => balls.extend([(cone.base, cone.radius), (cone.apex, cone.apex_radius)]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Cloud, CloudMaterial, CloudShapes, Rows};
+
+    /// Every ball is inside the picture, and on each pair of opposite sides or the other one some ball touches.
+    #[test]
+    fn everything_is_in_the_picture_and_nothing_could_be_nearer() {
+        let rows = vec![[5.0, 1.0, -2.0, 0.5], [-3.0, 0.2, 4.0, 2.0], [0.0, 6.0, 0.0, 0.1], [1.0, -2.0, 9.0, 1.0]];
+        let shapes = CloudShapes::Spheres(Rows::F64(rows.clone()));
+        let cloud = Cloud { shapes, material: CloudMaterial::One(0), colors: None, name: None, group: None };
+        let scene = Scene { clouds: vec![cloud], ..Scene::default() };
+        for (vfov, aspect, up) in [(30.0, 1.5, DVec3::Y), (80.0, 0.3, DVec3::new(0.2, 0.1, 2.0)), (10.0, 1.0, DVec3::X)]
+        {
+            let lens = Lens::Pinhole { vfov };
+            let camera = Camera { name: None, eye: DVec3::ZERO, target: DVec3::X, up, lens };
+            for around in [false, true] {
+                let View { eye, target } = view(&scene, &camera, aspect, around);
+                let (right, true_up, forward) = Camera { eye, target, ..camera.clone() }.axes();
+                let tan = 0.5f64 * vfov.to_radians();
+                let mut most = f64::NEG_INFINITY;
+                for (axis, tan) in [(right, tan.tan() * aspect), (true_up, tan.tan())] {
+                    let (sin, cos) = (tan / MARGIN).atan().sin_cos();
+                    for [x, y, z, radius] in &rows {
+                        let ball = DVec3::new(*x, *y, *z) - eye;
+                        let beyond = cos * ball.dot(axis).abs() - sin * ball.dot(forward) + radius;
+                        assert!(beyond < 1e-9, "{beyond} {around}");
+                        most = most.max(beyond);
+                    }
+                }
+                assert!(around || most > -1e-9, "{most}");
+            }
+        }
+    }
+}
