@@ -4,6 +4,7 @@ mod block;
 mod query;
 mod reference;
 mod stats;
+mod task;
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -15,11 +16,12 @@ use rayon::prelude::*;
 
 pub use self::query::{Answers, Batch, Query};
 pub use self::stats::Stats;
+pub use self::task::{Task, Traced};
 
-use self::block::{Block, BlockWork};
+use self::block::Block;
 use crate::accel::Tree;
 use crate::film::{Picture, Window};
-use crate::integrate::{CameraRays, Direct, RayCounts, Record, Silent};
+use crate::integrate::{CameraRays, Direct, RayCounts, Record};
 use crate::output::{self, Description, Losses, Options, OutputError};
 use crate::plan::{InvalidScene, Plan, validate};
 use crate::scene::{Camera, ImageSettings, Scene};
@@ -234,22 +236,28 @@ impl<'s> Renderer<'s> {
 
     /// Renders the picture.
     pub fn render(&self, progress: &dyn Progress) -> Result<Rendering, RenderError> {
-        let window = self.checked_window()?;
+        self.checked_window()?;
         let pool = pool(self.threads)?;
         let threads = pool.current_num_threads();
         pool.install(|| {
-            if self.engine == Engine::Reference {
-                return reference::render(self, window, threads, progress);
-            }
-            let frame = Frame::prepare(self);
-            let (blocks, trace_seconds) = frame.trace(window, progress)?;
-            let mut picture = Picture::new((self.image.width, self.image.height), window);
-            let mut stats = frame.stats(threads, trace_seconds);
-            for (block, work) in blocks {
-                block.copy_to(&work.pixels, &mut picture);
-                stats.add(&work);
-            }
-            Ok(Rendering { picture, stats })
+            let task = Task::new(self)?;
+            let (start, done, stop) = (Instant::now(), AtomicU64::new(0), AtomicBool::new(false));
+            let stopped = || {
+                let now = stop.load(Ordering::Relaxed) || progress.cancelled();
+                stop.store(now, Ordering::Relaxed);
+                now
+            };
+            let trace = |block| {
+                if stopped() {
+                    return None;
+                }
+                let traced = task.trace(block, &stopped)?;
+                let samples = task.samples(block);
+                progress.advance(done.fetch_add(samples, Ordering::Relaxed) + samples, task.total());
+                Some(traced)
+            };
+            let traced: Option<Vec<_>> = (0..task.blocks()).into_par_iter().map(trace).collect();
+            Ok(task.finish(traced.ok_or(RenderError::Cancelled)?, threads, start))
         })
     }
 
@@ -325,25 +333,6 @@ impl<'s> Frame<'s> {
 
     fn direct(&self) -> Direct<'_> {
         Direct::new(&self.plan, &self.tree, self.max_depth, self.skip)
-    }
-
-    fn trace(&self, window: Window, progress: &dyn Progress) -> Result<(Vec<(Block, BlockWork)>, f64), RenderError> {
-        let start = Instant::now();
-        let direct = self.direct();
-        let (done, stop) = (AtomicU64::new(0), AtomicBool::new(false));
-        let total = window.area() as u64 * u64::from(self.spp);
-        let work = |block: Block| {
-            if stop.load(Ordering::Relaxed) || progress.cancelled() {
-                stop.store(true, Ordering::Relaxed);
-                return None;
-            }
-            let work = block.trace(&self.rays, &direct, self.spp, &mut Silent);
-            let samples = block.window.area() as u64 * u64::from(self.spp);
-            progress.advance(done.fetch_add(samples, Ordering::Relaxed) + samples, total);
-            Some((block, work))
-        };
-        let blocks: Option<Vec<_>> = Block::cover(window).into_par_iter().map(work).collect();
-        Ok((blocks.ok_or(RenderError::Cancelled)?, start.elapsed().as_secs_f64()))
     }
 
     fn stats(&self, threads: usize, trace_seconds: f64) -> Stats {

@@ -1,58 +1,67 @@
 //! A frame by the reference tracer: slow and plain, what the engine is measured by.
 
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use rayon::prelude::*;
-
-use super::{Progress, RenderError, Renderer, Rendering, Stats};
+use super::{Renderer, Stats};
 use crate::film::{Picture, Window};
 use crate::integrate::{RayCounts, RayKind};
-use crate::reference::{EventKind, Pixel, Reference};
+use crate::reference::{EventKind, Pixel, Reference, View};
 use crate::scene::RenderSettings;
 
-/// Renders a window, a row a task. There are no columns, no tree and no tests to count; of the shadow
-/// rays it is not known how many met something.
-pub(super) fn render(
-    renderer: &Renderer,
+/// A frame whose rows are its blocks. There are no columns, no tree and no tests to count; of the shadow rays it is
+/// not known how many met something.
+pub(super) struct Rows {
+    tracer: Reference,
+    view: View,
     window: Window,
-    threads: usize,
-    progress: &dyn Progress,
-) -> Result<Rendering, RenderError> {
-    let start = Instant::now();
-    let tracer = Reference::relative_to(renderer.scene, renderer.camera.eye);
-    let integrator = renderer.scene.render.integrator;
-    let settings = RenderSettings { integrator, max_depth: renderer.max_depth, seed: renderer.seed };
-    let view = tracer.view(renderer.camera, &renderer.image, &settings);
-    let plan_seconds = start.elapsed().as_secs_f64();
+    plan_seconds: f64,
+}
 
-    let (done, spp) = (AtomicU64::new(0), u64::from(renderer.image.spp));
-    let total = window.area() as u64 * spp;
-    let pixel = |x, y, counts: &mut RayCounts| {
-        if progress.cancelled() {
-            return None;
-        }
-        let pixel = tracer.pixel(&view, x, y);
-        add(counts, &pixel);
-        progress.advance(done.fetch_add(spp, Ordering::Relaxed) + spp, total);
-        Some(pixel.rgba.map(|sample| sample as f32))
-    };
-    let row = |y| {
-        let mut counts = RayCounts::default();
-        let pixels: Option<Vec<_>> = (window.x0..window.x1).map(|x| pixel(x, y, &mut counts)).collect();
-        Some((pixels?, counts))
-    };
-    let rows: Option<Vec<_>> = (window.y0..window.y1).into_par_iter().map(row).collect();
+/// A row.
+#[derive(Debug)]
+pub(super) struct RowWork {
+    row: usize,
+    pixels: Vec<[f32; 4]>,
+    counts: RayCounts,
+}
 
-    let trace_seconds = start.elapsed().as_secs_f64() - plan_seconds;
-    let mut stats = Stats { threads, plan_seconds, trace_seconds, ..Stats::default() };
-    let mut picture = Picture::new((renderer.image.width, renderer.image.height), window);
-    let rows = rows.ok_or(RenderError::Cancelled)?;
-    for ((pixels, counts), place) in rows.iter().zip(picture.pixels.chunks_mut(window.width())) {
-        place.copy_from_slice(pixels);
-        stats.rays.add(counts);
+impl Rows {
+    pub fn new(renderer: &Renderer, window: Window) -> Self {
+        let start = Instant::now();
+        let tracer = Reference::relative_to(renderer.scene, renderer.camera.eye);
+        let integrator = renderer.scene.render.integrator;
+        let settings = RenderSettings { integrator, max_depth: renderer.max_depth, seed: renderer.seed };
+        let view = tracer.view(renderer.camera, &renderer.image, &settings);
+        Rows { tracer, view, window, plan_seconds: start.elapsed().as_secs_f64() }
     }
-    Ok(Rendering { picture, stats })
+
+    /// A row, counted from 0; `None` where `stop` asked for that within.
+    pub fn trace(&self, row: usize, stop: &(dyn Fn() -> bool + Sync)) -> Option<RowWork> {
+        let (mut counts, y) = (RayCounts::default(), self.window.y0 + row as i32);
+        let mut pixel = |x| {
+            if stop() {
+                return None;
+            }
+            let pixel = self.tracer.pixel(&self.view, x, y);
+            add(&mut counts, &pixel);
+            Some(pixel.rgba.map(|sample| sample as f32))
+        };
+        let pixels: Option<Vec<_>> = (self.window.x0..self.window.x1).map(&mut pixel).collect();
+        Some(RowWork { row, pixels: pixels?, counts })
+    }
+
+    pub fn stats(&self, threads: usize, trace_seconds: f64) -> Stats {
+        Stats { threads, plan_seconds: self.plan_seconds, trace_seconds, ..Stats::default() }
+    }
+}
+
+impl RowWork {
+    /// Puts the row where it belongs.
+    pub fn add_to(&self, picture: &mut Picture, stats: &mut Stats) {
+        let start = self.row * self.pixels.len();
+        picture.pixels[start..start + self.pixels.len()].copy_from_slice(&self.pixels);
+        stats.rays.add(&self.counts);
+    }
 }
 
 fn add(counts: &mut RayCounts, pixel: &Pixel) {
