@@ -1,9 +1,13 @@
 //! The film: what a render leaves behind.
 //!
 //! This room answers for the [`Picture`], the type that a renderer fills, that every writer of
-//! [`crate::output`] takes and that every metric of [`crate::measure`] compares. Files, curves and
-//! quantisation belong to `output`.
+//! [`crate::output`] takes and that every metric of [`crate::measure`] compares: colour, the [`Channel`]s
+//! beside it, and the names behind [`Cryptomatte`] ids. Files, curves and quantisation belong to `output`.
 
+mod channel;
+mod cryptomatte;
 mod picture;
 
+pub use self::channel::{Channel, Samples};
+pub use self::cryptomatte::Cryptomatte;
 pub use self::picture::{Picture, Window};

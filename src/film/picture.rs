@@ -1,5 +1,8 @@
 //! A finished picture and the window that it covers.
 
+use super::channel::Channel;
+use super::cryptomatte::Cryptomatte;
+
 /// A rectangle of pixels, half open: `x0 <= x < x1`, `y0 <= y < y1`; x right, y down, the first pixel
 /// of the display window at (0, 0). Empty where `x1 <= x0` or `y1 <= y0`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,9 +70,9 @@ fn extent(from: i32, to: i32) -> usize {
     usize::try_from(i64::from(to) - i64::from(from)).unwrap_or(0)
 }
 
-/// A finished picture: scene-linear Rec. 709 with premultiplied alpha.
+/// A finished picture: scene-linear Rec. 709 with premultiplied alpha, and the layers beside it.
 ///
-/// A writer refuses a picture whose list of pixels is not as long as its window is large.
+/// A writer refuses a picture whose lists of pixels are not as long as its window is large.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
     /// Width and height of the full frame, in pixels: the display window, whose first pixel is (0, 0).
@@ -80,12 +83,22 @@ pub struct Picture {
     /// Red, green, blue, alpha of each pixel of the window, row by row from the top. Radiance has no
     /// upper bound, alpha is in 0..1, colour is already multiplied by alpha.
     pub pixels: Vec<[f32; 4]>,
+    /// Layers beside the colour, in no order that means anything; no name occurs twice.
+    pub channels: Vec<Channel>,
+    /// What the Cryptomatte channels among them stand for.
+    pub cryptomattes: Vec<Cryptomatte>,
 }
 
 impl Picture {
-    /// A picture of transparent black.
+    /// A picture of transparent black, without layers.
     pub fn new(display: (u32, u32), window: Window) -> Self {
-        Picture { display, window, pixels: vec![[0.0; 4]; window.area()] }
+        let pixels = vec![[0.0; 4]; window.area()];
+        Picture { display, window, pixels, channels: Vec::new(), cryptomattes: Vec::new() }
+    }
+
+    /// The layer channel of this full name, `depth.Z`.
+    pub fn channel(&self, name: &str) -> Option<&Channel> {
+        self.channels.iter().find(|channel| channel.name == name)
     }
 
     /// The pixel at (x, y) of the display window, or `None` where the picture has none.
@@ -93,25 +106,30 @@ impl Picture {
         self.window.index(x, y).and_then(|index| self.pixels.get(index)).copied()
     }
 
-    /// Whether there is a pixel at all, and one for each place of the window.
+    /// Whether there is a pixel at all, and one for each place of the window, in each channel.
     pub fn is_whole(&self) -> bool {
-        !self.pixels.is_empty() && self.pixels.len() == self.window.area()
+        let area = self.window.area();
+        area > 0 && self.pixels.len() == area && self.channels.iter().all(|channel| channel.samples.len() == area)
     }
 
-    /// The part of the picture that lies in `window`; the frame stays the same. `None` where the
-    /// window is empty or reaches beyond the picture's own.
+    /// The part of the picture that lies in `window`; the frame stays the same, and manifests keep the names
+    /// that are left. `None` where the window is empty or reaches beyond the picture's own.
     pub fn crop(&self, window: Window) -> Option<Picture> {
         if window.area() == 0 || !self.window.holds(&window) || !self.is_whole() {
             return None;
         }
-        let row = |y| self.window.index(window.x0, y).map(|start| &self.pixels[start..start + window.width()]);
-        let pixels = (window.y0..window.y1).filter_map(row).flatten().copied().collect();
-        Some(Picture { display: self.display, window, pixels })
+        let row = |y| self.window.index(window.x0, y).map(|start| start..start + window.width());
+        let rows: Vec<_> = (window.y0..window.y1).filter_map(row).collect();
+        let pixels = rows.iter().flat_map(|row| &self.pixels[row.clone()]).copied().collect();
+        let channels: Vec<_> = self.channels.iter().map(|channel| channel.rows(&rows)).collect();
+        let cryptomattes = self.cryptomattes.iter().map(|matte| matte.present(&channels)).collect();
+        Some(Picture { display: self.display, window, pixels, channels, cryptomattes })
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::Samples;
     use super::*;
 
     #[test]
@@ -133,8 +151,12 @@ mod tests {
         for (index, pixel) in picture.pixels.iter_mut().enumerate() {
             pixel[0] = index as f32;
         }
+        let samples = Samples::Uint((0..24).collect());
+        picture.channels.push(Channel { name: "id.object".into(), samples });
         let window = Window { x0: 2, y0: 1, x1: 5, y1: 3 };
         let part = picture.crop(window).expect("inside");
+        let ids = part.channel("id.object").map(|channel| &channel.samples);
+        assert_eq!(ids, Some(&Samples::Uint(vec![8, 9, 10, 14, 15, 16])));
         assert_eq!(part.display, (6, 4));
         for index in 0..window.area() {
             let (x, y) = window.pixel(index);
@@ -143,5 +165,13 @@ mod tests {
         assert_eq!(part.get(1, 1), None);
         assert_eq!(picture.crop(Window { x0: 2, y0: 1, x1: 7, y1: 3 }), None);
         assert_eq!(picture.crop(Window { x0: 2, y0: 1, x1: 2, y1: 3 }), None);
+    }
+
+    #[test]
+    fn a_channel_that_is_too_short_is_seen() {
+        let mut picture = Picture::new((2, 2), Window::full((2, 2)));
+        assert!(picture.is_whole());
+        picture.channels.push(Channel { name: "depth.Z".into(), samples: Samples::Float(vec![1.0; 3]) });
+        assert!(!picture.is_whole());
     }
 }

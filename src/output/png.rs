@@ -141,7 +141,7 @@ mod tests {
 
     fn row(pixels: &[[f32; 4]]) -> Picture {
         let display = (pixels.len() as u32, 1);
-        Picture { display, window: Window::full(display), pixels: pixels.to_vec() }
+        Picture { pixels: pixels.to_vec(), ..Picture::new(display, Window::full(display)) }
     }
 
     fn decoded(bytes: &[u8]) -> (png::OutputInfo, Vec<u8>) {

@@ -33,7 +33,7 @@ pub(super) fn read(reader: impl BufRead + Seek, length: usize) -> Result<Picture
     let slots = slots(&header);
     check_header(&header, length)?;
     let (display, window) = windows(&header)?;
-    let mut picture = Picture { display, window, pixels: vec![[0.0, 0.0, 0.0, 1.0]; window.area()] };
+    let mut picture = Picture { pixels: vec![[0.0, 0.0, 0.0, 1.0]; window.area()], ..Picture::new(display, window) };
     // Strict about the places of chunks, so that none is missed in silence.
     let chunks = chunks.filter_chunks(true, |_, tile, block| block.layer == 0 && tile.level_index == Vec2(0, 0))?;
     let meta = chunks.meta_data().clone();

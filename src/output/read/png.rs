@@ -40,7 +40,7 @@ pub(super) fn read(reader: impl BufRead + Seek, length: usize) -> Result<Picture
         _ => linear::<1>(&samples, color, |[code]| srgb::from_u8(code), 255.0),
     };
     let display = (width, height);
-    Ok(Picture { display, window: Window::full(display), pixels })
+    Ok(Picture { pixels, ..Picture::new(display, Window::full(display)) })
 }
 
 /// Codes to linear light, alpha multiplied in. `BYTES` a sample, the most significant first.
