@@ -176,6 +176,10 @@ fn camera(camera: &scene::Camera) -> Value {
     let lens = match camera.lens {
         Lens::Pinhole { vfov } => json!({ "type": "pinhole", "vfov": vfov }),
         Lens::Orthographic { height } => json!({ "type": "orthographic", "height": height }),
+        Lens::ThinLens { vfov, aperture, focus } => {
+            json!({ "type": "thin-lens", "vfov": vfov, "aperture": aperture, "focus": focus })
+        }
+        Lens::Panoramic => json!({ "type": "panoramic" }),
     };
     let (eye, target, up) = (camera.eye.to_array(), camera.target.to_array(), camera.up.to_array());
     json!({ "name": camera.name, "eye": eye, "target": target, "up": up, "lens": lens })

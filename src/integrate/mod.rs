@@ -8,7 +8,7 @@ mod lights;
 mod record;
 mod wave;
 
-pub use self::camera::{CameraRays, Samples8};
+pub use self::camera::{CameraRays, PixelPattern, Samples8};
 pub use self::direct::{Direct, Room, Samples};
 pub use self::record::{RayCounts, RayKind, Record, Silent};
 pub use self::wave::{ExactRays, Wave};

@@ -98,7 +98,7 @@ fn layer_attributes(picture: &Picture, description: &Description) -> LayerAttrib
     if let Some(camera) = &description.camera {
         let view = View::new(camera, picture.display);
         attributes.world_to_camera = Some(view.world_to_camera);
-        attributes.world_to_normalized_device = Some(view.world_to_ndc);
+        attributes.world_to_normalized_device = view.world_to_ndc;
         attributes.screen_window_width = view.screen_window_width;
     }
     if let Some(run) = &description.run {

@@ -11,9 +11,9 @@ use crate::scene::{Camera, Lens};
 pub(super) struct View {
     /// Sixteen numbers, row by row.
     pub world_to_camera: [f32; 16],
-    /// Sixteen numbers, row by row.
-    pub world_to_ndc: [f32; 16],
-    /// Width of the picture at distance 1 from the eye; 1 for an orthographic lens, where it means nothing.
+    /// Sixteen numbers, row by row; none for a panorama, which no matrix makes.
+    pub world_to_ndc: Option<[f32; 16]>,
+    /// Width of the picture at distance 1 from the eye; 1 for other than central projections, where it means nothing.
     pub screen_window_width: f32,
 }
 
@@ -30,11 +30,11 @@ impl View {
         let world_to_camera = [axis(0), axis(1), axis(2), moved];
         // A picture of no height is refused when it is written.
         let aspect = f64::from(display.0) / f64::from(display.1.max(1));
-        let (camera_to_ndc, screen_window_width) = project(camera.lens, aspect.max(f64::MIN_POSITIVE));
+        let projection = project(camera.lens, aspect.max(f64::MIN_POSITIVE));
         View {
             world_to_camera: single(world_to_camera),
-            world_to_ndc: single(times(world_to_camera, camera_to_ndc)),
-            screen_window_width: screen_window_width as f32,
+            world_to_ndc: projection.map(|(camera_to_ndc, _)| single(times(world_to_camera, camera_to_ndc))),
+            screen_window_width: projection.map_or(1.0, |(_, width)| width as f32),
         }
     }
 }
@@ -43,9 +43,9 @@ type Matrix = [[f64; 4]; 4];
 
 /// Camera space to NDC, and the width of the screen window. The scene's definition of a lens, solved for the
 /// picture: x/W = 1/2 + sx H/(2W), y/H = 1/2 - sy/2.
-fn project(lens: Lens, aspect: f64) -> (Matrix, f64) {
-    match lens {
-        Lens::Pinhole { vfov } => {
+fn project(lens: Lens, aspect: f64) -> Option<(Matrix, f64)> {
+    Some(match lens {
+        Lens::Pinhole { vfov } | Lens::ThinLens { vfov, .. } => {
             let tan = (vfov.to_radians() / 2.0).tan();
             let (x, y) = (0.5 / (aspect * tan), -0.5 / tan);
             let last = [0.0, 0.0, -NEAR, 0.0];
@@ -56,7 +56,8 @@ fn project(lens: Lens, aspect: f64) -> (Matrix, f64) {
             let last = [0.5, 0.5, 0.0, 1.0];
             ([[x, 0.0, 0.0, 0.0], [0.0, y, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], last], 1.0)
         }
-    }
+        Lens::Panoramic => return None,
+    })
 }
 
 fn times(a: Matrix, b: Matrix) -> Matrix {
@@ -89,20 +90,22 @@ mod tests {
     #[test]
     fn a_point_seen_at_a_pixel_projects_to_it() {
         let (w, h) = (640.0, 360.0);
-        for lens in [Lens::Pinhole { vfov: 37.0 }, Lens::Orthographic { height: 4.5 }] {
+        let thin = Lens::ThinLens { vfov: 37.0, aperture: 0.1, focus: 2.0 };
+        for lens in [Lens::Pinhole { vfov: 37.0 }, thin, Lens::Orthographic { height: 4.5 }] {
             let camera = camera(lens);
             let view = View::new(&camera, (640, 360));
             let (right, up, forward) = camera.axes();
             for (x, y, t) in [(0.0, 0.0, 1.0), (640.0, 360.0, 3.0), (17.5, 201.25, 9.0), (320.0, 180.0, 2.0)] {
                 let (sx, sy): (f64, f64) = ((2.0 * x - w) / h, (h - 2.0 * y) / h);
                 let (origin, dir) = match lens {
-                    Lens::Pinhole { vfov } => {
+                    Lens::Panoramic => unreachable!("not among them"),
+                    Lens::Pinhole { vfov } | Lens::ThinLens { vfov, .. } => {
                         (camera.eye, forward + (vfov.to_radians() / 2.0).tan() * (sx * right + sy * up))
                     }
                     Lens::Orthographic { height } => (camera.eye + height / 2.0 * (sx * right + sy * up), forward),
                 };
                 let point = origin + t * dir;
-                let ndc = apply(point, &view.world_to_ndc);
+                let ndc = apply(point, &view.world_to_ndc.unwrap());
                 // Sums of a few terms near 10 in f32.
                 assert!((ndc.x - x / w).abs() < 1e-5 && (ndc.y - y / h).abs() < 1e-5, "{lens:?} {x} {y}: {ndc}");
                 let seen = apply(point, &view.world_to_camera);
@@ -123,7 +126,7 @@ mod tests {
         assert!((row(0).dot(row(1).cross(row(2))) + 1.0).abs() < 1e-6);
         assert!(apply(camera.eye, &view.world_to_camera).length() < 1e-5);
         let (right, up, forward) = camera.axes();
-        let above = apply(camera.eye + 2.0 * forward + 0.3 * up + 0.1 * right, &view.world_to_ndc);
+        let above = apply(camera.eye + 2.0 * forward + 0.3 * up + 0.1 * right, &view.world_to_ndc.unwrap());
         assert!(above.x > 0.5 && above.y < 0.5 && above.z > 0.0 && above.z < 1.0, "{above}");
         assert!((f64::from(view.screen_window_width) - 4.0 * (30f64).to_radians().tan()).abs() < 1e-6);
     }

@@ -1,6 +1,8 @@
 //! Points of the picture as rays.
 
-use glam::DVec3;
+use std::f64::consts::{PI, TAU};
+
+use glam::{DVec2, DVec3};
 
 use super::{Ray, Reference};
 use crate::sample;
@@ -56,14 +58,37 @@ impl View {
         (center_x + self.filter.offset(a), center_y + self.filter.offset(b))
     }
 
-    /// The ray through a point of the picture, in pixels from its upper left corner.
-    pub fn ray(&self, x: f64, y: f64) -> Ray {
+    /// The camera ray of a sample of a pixel.
+    pub fn sample(&self, x: i32, y: i32, sample: u32) -> Ray {
+        let (px, py) = self.point(x, y, sample);
+        let key = sample::pixel_key(self.seed, x, y);
+        match self.lens {
+            Lens::ThinLens { .. } => self.ray(px, py, sample::pair(key, sample, sample::dimension::LENS)),
+            Lens::Pinhole { .. } | Lens::Orthographic { .. } | Lens::Panoramic => self.ray(px, py, [0; 2]),
+        }
+    }
+
+    /// The ray through a point of the picture, in pixels from its upper left corner, and for a thin lens
+    /// through a point of that.
+    pub fn ray(&self, x: f64, y: f64, lens: [u32; 2]) -> Ray {
         let across = (2.0 * x - self.width) / self.height;
         let upward = (self.height - 2.0 * y) / self.height;
         let shift = across * self.right + upward * self.up;
         let (origin, dir) = match self.lens {
             Lens::Pinhole { vfov } => (self.eye, self.forward + (0.5 * vfov.to_radians()).tan() * shift),
             Lens::Orthographic { height } => (self.eye + 0.5 * height * shift, self.forward),
+            Lens::ThinLens { vfov, aperture, focus } => {
+                let sharp = focus * (self.forward + (0.5 * vfov.to_radians()).tan() * shift);
+                let [u, v] = lens.map(sample::unit);
+                let place = DVec2::from_angle(TAU * v) * (aperture * u.sqrt());
+                let off = place.x * self.right + place.y * self.up;
+                (self.eye + off, sharp - off)
+            }
+            Lens::Panoramic => {
+                let (azimuth, polar) = (TAU * (x / self.width - 0.5), PI * y / self.height);
+                let level = azimuth.sin() * self.right + azimuth.cos() * self.forward;
+                (self.eye, polar.sin() * level + polar.cos() * self.up)
+            }
         };
         Ray { origin, dir, t_min: 0.0, t_max: f64::INFINITY }
     }

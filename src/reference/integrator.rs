@@ -83,9 +83,8 @@ impl Reference {
     pub fn pixel(&self, view: &View, x: i32, y: i32) -> Pixel {
         let mut pixel = Pixel::default();
         for sample in 0..view.spp {
-            let (x, y) = view.point(x, y, sample);
             let mut walk = Walk { tracer: self, sample, max_depth: view.max_depth, pixel: &mut pixel };
-            let (radiance, alpha) = walk.radiance(view.ray(x, y));
+            let (radiance, alpha) = walk.radiance(view.sample(x, y, sample));
             for (sum, value) in pixel.rgba.iter_mut().zip([radiance.x, radiance.y, radiance.z, alpha]) {
                 *sum += value;
             }

@@ -4,9 +4,8 @@ use std::ops::Range;
 
 use crate::accel::PACKETS;
 use crate::film::{Picture, Window};
-use crate::integrate::{CameraRays, Direct, RayKind, Record, Room, Samples, Samples8, Wave};
+use crate::integrate::{CameraRays, Direct, PixelPattern, RayKind, Record, Room, Samples, Samples8, Wave};
 use crate::lanes::LANES;
-use crate::sample::Pattern;
 
 /// Pixels along an edge.
 const EDGE: i32 = 32;
@@ -105,7 +104,7 @@ struct Pending {
 impl Pending {
     /// Adds samples of a pixel as far as their packet has room: the first one that is left.
     #[inline(always)]
-    fn push(&mut self, place: (i32, i32), pattern: Pattern, samples: Range<u32>, pixel: usize) -> u32 {
+    fn push(&mut self, place: (i32, i32), pattern: PixelPattern, samples: Range<u32>, pixel: usize) -> u32 {
         let (p, lane) = (self.count / LANES, self.count % LANES);
         let count = LANES.min(lane + samples.len()) - lane;
         for (lane, sample) in (lane..lane + count).zip(samples.start..) {

@@ -33,6 +33,20 @@ pub enum Lens {
         /// Scene units from the lower to the upper edge of the picture, > 0.
         height: f64,
     },
+    /// As a pinhole, but the ray through (x, y) starts at `lens = eye + aperture (r cos a right + r sin a true_up)`
+    /// and goes to where the pinhole's ray meets the plane at `focus`: with (u, v) of the sample's pair
+    /// [`dimension::LENS`](crate::sample::dimension::LENS), `r = sqrt(u)` and `a = 2 pi v`.
+    ThinLens {
+        /// Degrees, 0 < vfov < 180.
+        vfov: f64,
+        /// Radius of the lens, scene units, > 0.
+        aperture: f64,
+        /// Distance of the plane that is sharp, along the view axis, scene units, > 0.
+        focus: f64,
+    },
+    /// Everything round the eye, lat-long: origin `eye`, direction
+    /// `sin b (sin a right + cos a forward) + cos b true_up` with `a = 2 pi (x/W - 1/2)` and `b = pi y/H`.
+    Panoramic,
 }
 
 impl Camera {

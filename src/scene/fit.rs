@@ -38,8 +38,11 @@ pub fn view(scene: &Scene, camera: &Camera, aspect: f64, around: bool) -> View {
     let high = balls.iter().fold(DVec3::NEG_INFINITY, |high, (center, radius)| high.max(center + *radius));
     let center = 0.5 * (low + high);
     let radius = balls.iter().map(|(ball, radius)| (ball - center).length() + radius).fold(0.0, f64::max);
-    let Lens::Pinhole { vfov } = camera.lens else {
-        return View { eye: center + 3.0 * radius * direction, target: center };
+    let vfov = match camera.lens {
+        Lens::Pinhole { vfov } | Lens::ThinLens { vfov, .. } => vfov,
+        Lens::Orthographic { .. } | Lens::Panoramic => {
+            return View { eye: center + 3.0 * radius * direction, target: center };
+        }
     };
     let tan = (0.5 * vfov).to_radians().tan() / MARGIN;
     let tans = DVec2::new(tan * aspect, tan);

@@ -189,6 +189,12 @@ pub fn camera(camera: &Camera) -> Result<(), Broken> {
     match camera.lens {
         Lens::Pinhole { vfov } => number(kind, "vfov", vfov, Rule::VFOV)?,
         Lens::Orthographic { height } => number(kind, "height", height, Rule::LENGTH)?,
+        Lens::ThinLens { vfov, aperture, focus } => {
+            number(kind, "vfov", vfov, Rule::VFOV)?;
+            number(kind, "aperture", aperture, Rule::LENGTH)?;
+            number(kind, "focus", focus, Rule::LENGTH)?;
+        }
+        Lens::Panoramic => {}
     }
     let view = camera.target - camera.eye;
     if direction_broken_by(view).is_some() {

@@ -30,11 +30,16 @@ const FILTERS: &[(&str, FilterKind)] =
 enum LensKind {
     Pinhole,
     Orthographic,
+    ThinLens,
+    Panoramic,
 }
 
-const LENSES: &[(&str, LensKind)] = &[("pinhole", LensKind::Pinhole), ("orthographic", LensKind::Orthographic)];
-const LATER_LENS: &str = "thin-lens and panoramic cameras are not in this version: use \"pinhole\" or \"orthographic\"";
-const LATER_LENSES: &[(&str, &str)] = &[("thin-lens", LATER_LENS), ("panoramic", LATER_LENS)];
+const LENSES: &[(&str, LensKind)] = &[
+    ("pinhole", LensKind::Pinhole),
+    ("orthographic", LensKind::Orthographic),
+    ("thin-lens", LensKind::ThinLens),
+    ("panoramic", LensKind::Panoramic),
+];
 
 impl<'a> Reader<'a, '_> {
     /// Reads all tables that are there once.
@@ -199,12 +204,19 @@ struct Placing {
 }
 
 fn camera(mut table: Table<'_>, name: Option<String>) -> Option<(Camera, Placing)> {
-    let kind = table.kind(LENSES, LATER_LENSES)?;
+    let kind = table.kind(LENSES, &[])?;
     let lens = match kind {
         LensKind::Pinhole => table.need("vfov", number(Rule::VFOV)).map(|vfov| Lens::Pinhole { vfov }),
         LensKind::Orthographic => {
             table.need("height", number(Rule::LENGTH)).map(|height| Lens::Orthographic { height })
         }
+        LensKind::ThinLens => {
+            let vfov = table.need("vfov", number(Rule::VFOV));
+            let (aperture, focus) =
+                (table.need("aperture", number(Rule::LENGTH)), table.need("focus", number(Rule::LENGTH)));
+            (|| Some(Lens::ThinLens { vfov: vfov?, aperture: aperture?, focus: focus? }))()
+        }
+        LensKind::Panoramic => Some(Lens::Panoramic),
     };
     let up = table.or("up", DVec3::Y, direction);
     let orbit = table.maybe("orbit", number(Rule::FINITE));

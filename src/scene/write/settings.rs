@@ -74,6 +74,12 @@ fn camera(scene: &Scene, index: usize, camera: &Camera) -> Table {
     let table = match camera.lens {
         Lens::Pinhole { vfov } => table.set("type", quoted("pinhole")).set("vfov", number(vfov)),
         Lens::Orthographic { height } => table.set("type", quoted("orthographic")).set("height", number(height)),
+        Lens::ThinLens { vfov, aperture, focus } => table
+            .set("type", quoted("thin-lens"))
+            .set("vfov", number(vfov))
+            .set("aperture", number(aperture))
+            .set("focus", number(focus)),
+        Lens::Panoramic => table.set("type", quoted("panoramic")),
     };
     // The eye is kept as it is turned at this frame.
     let angle = orbit.and_then(|track| track.now.first()).map_or(0.0, |angle| -angle);

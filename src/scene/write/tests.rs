@@ -121,6 +121,8 @@ fn everything(picture: &Path) -> Scene {
         cameras: vec![
             camera("front", Lens::Pinhole { vfov: 100.0 * THIRD }),
             camera("top", Lens::Orthographic { height: THIRD }),
+            camera("lens", Lens::ThinLens { vfov: 100.0 * THIRD, aperture: 0.1, focus: 1e3 * THIRD }),
+            camera("round", Lens::Panoramic),
         ],
         background: Background {
             backdrop: Backdrop::Gradient { top: ODD.abs(), bottom: DVec3::ONE },
