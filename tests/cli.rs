@@ -149,6 +149,7 @@ fn outputs_that_cannot_be_written_are_refused_before_any_work() {
         ("render none.toml -o a.exr --stats a.exr", 2, "both the picture and --stats"),
         ("render none.toml -o a.png --float", 2, "--float is for EXR"),
         ("render none.toml -o a.exr --bits 16", 2, "--bits is for PNG"),
+        ("render none.toml -o a.exr --tonemap agx", 2, "--tonemap is for PNG"),
         ("query none.toml rays.npy -o gone/hits.npy", 4, "gone/hits.npy: cannot be written"),
         ("query none.toml rays.npy -o hits.txt", 2, "hits should go to a .npy file"),
         ("convert none.toml gone/b.toml", 4, "gone/b.toml: cannot be written"),
@@ -188,6 +189,8 @@ fn wrong_usage_says_what_would_be_right() {
         ("convert a.exr a.toml", "should end in .exr or .png"),
         ("convert a.jpg a.png", "should end in .toml, .nff, .nff.gz, .exr or .png"),
         ("convert scene.toml b.toml --float", "are for pictures"),
+        ("render scene.toml -o a.png --exposure x", "stops from -64 to 64"),
+        ("render scene.toml -o a.png --white 0", "above 0"),
         ("completions cmd", "possible values: bash"),
     ] {
         let (out, err) = room.texts(arguments, 2);
@@ -491,4 +494,26 @@ fn threads_come_from_slurm_where_nothing_is_said() {
         json(&fs::read_to_string(room.path("a.json")).unwrap())["threads"].as_u64().unwrap()
     };
     assert_eq!((threads(""), threads("-t 2")), (3, 2));
+}
+
+/// EXR and then PNG is the same picture as PNG at once: the same bytes from floats, codes within one from halves.
+#[test]
+fn a_png_is_the_same_by_way_of_an_exr() {
+    let room = Room::new();
+    for options in ["", "--exposure 1.5 --tonemap agx", "--tonemap reinhard --white 4", "--bits 16 --tonemap khronos"] {
+        room.texts(&format!("render scene.toml -q -o direct.png {options}"), 0);
+        room.texts("render scene.toml -q --float -o float.exr", 0);
+        room.texts(&format!("convert float.exr float.png {options}"), 0);
+        let pixels = |name: &str| output::read(&room.path(name)).unwrap().pixels;
+        assert!(pixels("direct.png") == pixels("float.png"), "{options}");
+    }
+    room.texts("render scene.toml -q -o half.exr", 0);
+    room.texts("render scene.toml -q -o direct.png", 0);
+    room.texts("convert half.exr half.png", 0);
+    let codes = |name: &str| {
+        let pixels = output::read(&room.path(name)).unwrap().pixels;
+        pixels.into_iter().flatten().map(output::srgb::to_u8).collect::<Vec<_>>()
+    };
+    let (direct, half) = (codes("direct.png"), codes("half.png"));
+    assert!(direct.iter().zip(&half).all(|(a, b)| a.abs_diff(*b) <= 1));
 }

@@ -73,7 +73,7 @@ fn kind(path: &Path) -> Option<Kind> {
 
 fn convert_scene(args: &Args, run: &Run) -> Result<Exit, Failure> {
     if args.depth.is_given() {
-        return Err(Failure::new(Exit::Usage, "--float and --bits are for pictures, not for scenes"));
+        return Err(Failure::new(Exit::Usage, "--float, --bits and their like are for pictures, not for scenes"));
     }
     run.check_output(&args.output, &[&args.input])?;
     let scene = args.moment.load(&args.input, None, run)?.scene;

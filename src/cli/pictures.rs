@@ -3,9 +3,9 @@
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use octray::film::Picture;
-use octray::output::{self, Bits, Description, Format, Losses, Options, OutputError, aside};
+use octray::output::{self, Bits, Coding, Description, Display, Format, Losses, Options, OutputError, ToneMap, aside};
 
 use super::Run;
 use super::exit::{Exit, Failure};
@@ -19,6 +19,55 @@ pub struct Depth {
     /// PNG: bits a sample, 8 (usual) or 16
     #[arg(long, value_name = "8|16", value_parser = ["8", "16"])]
     bits: Option<String>,
+    /// PNG: brighter by so many stops, or darker by a negative number [default: 0]
+    #[arg(long, value_name = "STOPS", value_parser = stops, allow_negative_numbers = true)]
+    exposure: Option<f32>,
+    /// PNG: the light that becomes white [default: 1, or what the tone map makes of it]
+    #[arg(long, value_name = "X", value_parser = white)]
+    white: Option<f32>,
+    /// PNG: how bright light is fitted into what a display can show [default: none, it is cut off]
+    #[arg(long, value_enum, value_name = "NAME")]
+    tonemap: Option<ToneMapName>,
+    /// PNG: round 8-bit samples to the nearest instead of dithering them by a fixed pattern
+    #[arg(long)]
+    no_dither: bool,
+}
+
+/// Tone maps by their names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum ToneMapName {
+    /// Cut off above 1
+    None,
+    /// Reinhard's curve on luminance; --white is its white point
+    Reinhard,
+    /// The ACES reference and output transforms, as fitted by Hill
+    Aces,
+    /// AgX, the base look
+    Agx,
+    /// Khronos PBR Neutral: true colours, highlights compressed
+    Khronos,
+}
+
+impl From<ToneMapName> for ToneMap {
+    fn from(name: ToneMapName) -> Self {
+        match name {
+            ToneMapName::None => ToneMap::None,
+            ToneMapName::Reinhard => ToneMap::Reinhard,
+            ToneMapName::Aces => ToneMap::Aces,
+            ToneMapName::Agx => ToneMap::Agx,
+            ToneMapName::Khronos => ToneMap::Khronos,
+        }
+    }
+}
+
+fn stops(text: &str) -> Result<f32, String> {
+    let stops = text.parse::<f32>().ok().filter(|stops| stops.abs() <= 64.0);
+    stops.ok_or_else(|| "should be a number of stops from -64 to 64".to_owned())
+}
+
+fn white(text: &str) -> Result<f32, String> {
+    let white = text.parse::<f32>().ok().filter(|white| (1e-6..=1e9).contains(white));
+    white.ok_or_else(|| "should be a number above 0 (1e-6 to 1e9)".to_owned())
 }
 
 /// Where a picture goes.
@@ -66,23 +115,42 @@ impl std::fmt::Display for Target {
 impl Depth {
     /// Whether the user chose anything.
     pub fn is_given(&self) -> bool {
-        self.float || self.bits.is_some()
+        self.float || self.of_png().is_some()
+    }
+
+    /// The first option given that is for PNG alone.
+    fn of_png(&self) -> Option<&'static str> {
+        let given = [
+            (self.bits.is_some(), "--bits"),
+            (self.exposure.is_some(), "--exposure"),
+            (self.white.is_some(), "--white"),
+            (self.tonemap.is_some(), "--tonemap"),
+            (self.no_dither, "--no-dither"),
+        ];
+        given.into_iter().find_map(|(given, name)| given.then_some(name))
     }
 
     /// The options for a target, which must be of the format that they are for.
     pub fn options(&self, target: &Target) -> Result<Options, Failure> {
-        match target.format() {
-            Format::Exr if self.bits.is_some() => {
-                Err(Failure::new(Exit::Usage, "--bits is for PNG: an EXR has 16 bits a sample, or 32 with --float"))
+        let usage = |text: String| Err(Failure::new(Exit::Usage, text));
+        match (target.format(), self.of_png()) {
+            (Format::Exr, Some("--bits")) => {
+                usage("--bits is for PNG: an EXR has 16 bits a sample, or 32 with --float".into())
             }
-            Format::Png if self.float => {
-                Err(Failure::new(Exit::Usage, "--float is for EXR: a PNG has --bits 8 or --bits 16"))
-            }
-            _ => {
-                let bits = if self.bits.as_deref() == Some("16") { Bits::Sixteen } else { Bits::Eight };
-                Ok(Options { float: self.float, bits })
-            }
+            (Format::Exr, Some(name)) => usage(format!("{name} is for PNG: an EXR holds the light itself")),
+            (Format::Png, _) if self.float => usage("--float is for EXR: a PNG has --bits 8 or --bits 16".into()),
+            _ => Ok(Options { float: self.float, coding: self.coding() }),
         }
+    }
+
+    fn coding(&self) -> Coding {
+        let display = Display {
+            exposure: self.exposure.unwrap_or(0.0),
+            white: self.white,
+            tone_map: self.tonemap.map_or(ToneMap::None, ToneMap::from),
+        };
+        let bits = if self.bits.as_deref() == Some("16") { Bits::Sixteen } else { Bits::Eight };
+        Coding { bits, display, dither: !self.no_dither }
     }
 }
 
@@ -96,7 +164,7 @@ pub fn write(
 ) -> Result<(), Failure> {
     let encoded = match target.format() {
         Format::Exr => output::exr::encode(picture, options.float, description),
-        Format::Png => output::png::encode(picture, options.bits, description),
+        Format::Png => output::png::encode(picture, options.coding, description),
     };
     let (bytes, losses) =
         encoded.map_err(|error| Failure::new(Exit::Output, format!("{target}: cannot be encoded: {error}")))?;

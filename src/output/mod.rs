@@ -7,6 +7,7 @@
 
 pub mod aside;
 pub mod description;
+mod display;
 pub mod exr;
 pub mod png;
 pub mod read;
@@ -18,7 +19,8 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 pub use self::description::{Description, Run};
-pub use self::png::Bits;
+pub use self::display::{Display, ToneMap};
+pub use self::png::{Bits, Coding};
 pub use self::read::{ReadError, read};
 use crate::film::Picture;
 
@@ -44,12 +46,12 @@ impl Format {
 }
 
 /// How samples are stored.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Options {
     /// EXR: 32-bit floats instead of halves.
     pub float: bool,
-    /// PNG: bits per sample.
-    pub bits: Bits,
+    /// PNG: bits per sample, and what a display is to show.
+    pub coding: Coding,
 }
 
 /// Samples that a file could not hold as they were.
@@ -114,7 +116,7 @@ pub fn write(
 ) -> Result<Losses, OutputError> {
     let encoded = match Format::of(path) {
         Some(Format::Exr) => exr::encode(picture, options.float, description),
-        Some(Format::Png) => png::encode(picture, options.bits, description),
+        Some(Format::Png) => png::encode(picture, options.coding, description),
         None => return Err(OutputError::Format { path: path.into() }),
     };
     let (bytes, losses) = encoded.map_err(|reason| OutputError::Encode { path: path.into(), reason: reason.0 })?;

@@ -1,14 +1,38 @@
 //! PNG files: what a display shows of a picture, by the exact sRGB curve, with straight alpha.
 //!
-//! The file holds the pixels of the picture's window. Colour is divided by alpha before the curve, then clamped
-//! to 0..1 and rounded to the nearest code. A picture that is opaque at this depth has no alpha channel.
+//! The file holds the pixels of the picture's window. Colour is divided by alpha, goes through exposure, white point
+//! and tone map ([`Display`]) and then the curve, is clamped to 0..1 and becomes a code: the nearest of 65,536, or one
+//! of the two of 256 around it by a fixed table of 8 x 8 places (dither), the nearest without it. A picture that is
+//! opaque in halves has no alpha channel, so that a picture gives the same file whether it went through a half-float
+//! EXR or not, but for a code's difference.
 //! The `sRGB` chunk says which curve it was; the crate adds the matching `gAMA` and `cHRM`.
 
+use half::f16;
 use png::{BitDepth, ColorType, Compression, Encoder, SrgbRenderingIntent};
+use rayon::prelude::*;
 
 use super::description::{self, Description};
-use super::{EncodeError, Losses, srgb};
+use super::display::Shown;
+use super::{Display, EncodeError, Losses, srgb};
 use crate::film::Picture;
+
+/// How a picture becomes the codes of a PNG.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coding {
+    /// Bits per sample.
+    pub bits: Bits,
+    /// What the display is to show.
+    pub display: Display,
+    /// Whether 8-bit codes are dithered.
+    pub dither: bool,
+}
+
+/// Eight bits, dithered, as it is.
+impl Default for Coding {
+    fn default() -> Self {
+        Coding { bits: Bits::Eight, display: Display::default(), dither: true }
+    }
+}
 
 /// Bits per sample of a PNG.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -35,21 +59,25 @@ pub struct Raster {
 ///
 /// # Errors
 /// A picture that is empty or not whole, or larger than the format counts (2^31).
-pub fn encode(picture: &Picture, bits: Bits, description: &Description) -> Result<(Vec<u8>, Losses), EncodeError> {
+pub fn encode(picture: &Picture, coding: Coding, description: &Description) -> Result<(Vec<u8>, Losses), EncodeError> {
     EncodeError::unless_whole(picture)?;
-    let mut losses = Losses::default();
-    let (color, samples) = match bits {
-        Bits::Eight => samples(picture, &mut losses, |v| [srgb::to_u8(v)], |a| [(a * 255.0).round() as u8]),
-        Bits::Sixteen => samples(
+    let shown = coding.display.prepare();
+    let nearest = |a: f32, codes: f32| (srgb::unit(a) * codes).round();
+    let (color, losses, samples) = match (coding.bits, coding.dither) {
+        (Bits::Eight, true) => {
+            samples(picture, &shown, |v, x, y| [srgb::to_u8_dithered(v, x, y)], |a| [nearest(a, 255.0) as u8])
+        }
+        (Bits::Eight, false) => samples(picture, &shown, |v, _, _| [srgb::to_u8(v)], |a| [nearest(a, 255.0) as u8]),
+        (Bits::Sixteen, _) => samples(
             picture,
-            &mut losses,
-            |v| srgb::to_u16(v).to_be_bytes(),
-            |a| ((a * 65535.0).round() as u16).to_be_bytes(),
+            &shown,
+            |v, _, _| srgb::to_u16(v).to_be_bytes(),
+            |a| (nearest(a, 65535.0) as u16).to_be_bytes(),
         ),
     };
     let size = |size: usize| u32::try_from(size).map_err(EncodeError::new);
     let size = (size(picture.window.width())?, size(picture.window.height())?);
-    let depth = if bits == Bits::Eight { BitDepth::Eight } else { BitDepth::Sixteen };
+    let depth = if coding.bits == Bits::Eight { BitDepth::Eight } else { BitDepth::Sixteen };
     Ok((file(size, color, depth, description.scene.as_deref(), &samples)?, losses))
 }
 
@@ -62,31 +90,43 @@ pub fn encode_raster(raster: &Raster, title: &str) -> Result<Vec<u8>, EncodeErro
     file(size, ColorType::Rgb, BitDepth::Eight, Some(title), raster.pixels.as_flattened())
 }
 
-/// Codes of all pixels, with alpha unless every alpha is the highest code.
+/// Codes of all pixels, with alpha unless the picture is opaque.
 fn samples<const BYTES: usize>(
     picture: &Picture,
-    losses: &mut Losses,
-    color_code: impl Fn(f32) -> [u8; BYTES],
-    alpha_code: impl Fn(f32) -> [u8; BYTES],
-) -> (ColorType, Vec<u8>) {
-    let highest = [u8::MAX; BYTES];
-    let alpha = |pixel: &[f32; 4]| alpha_code(srgb::unit(pixel[3]));
-    let opaque = picture.pixels.iter().all(|pixel| alpha(pixel) == highest);
-    let mut samples = Vec::with_capacity(picture.pixels.len() * BYTES * if opaque { 3 } else { 4 });
-    for pixel in &picture.pixels {
-        for value in straight(pixel) {
-            losses.count(value);
-            samples.extend_from_slice(&color_code(if value.is_finite() { value } else { 0.0 }));
+    shown: &Shown,
+    color_code: impl Fn(f32, i32, i32) -> [u8; BYTES] + Sync,
+    alpha_code: impl Fn(f32) -> [u8; BYTES] + Sync,
+) -> (ColorType, Losses, Vec<u8>) {
+    let opaque = picture.pixels.par_iter().all(|pixel| f16::from_f32(pixel[3]) >= f16::ONE);
+    let channels = if opaque { 3 } else { 4 };
+    let window = picture.window;
+    let mut samples = vec![0; picture.pixels.len() * BYTES * channels];
+    let row = |y: usize, codes: &mut [u8]| {
+        let mut losses = Losses::default();
+        let pixels = &picture.pixels[y * window.width()..][..window.width()];
+        for ((x, pixel), codes) in (window.x0..).zip(pixels).zip(codes.chunks_exact_mut(BYTES * channels)) {
+            let invisible = alpha_code(f16::from_f32(pixel[3]).to_f32()) == [0; BYTES];
+            let color = if invisible { [0.0; 3] } else { straight(pixel) };
+            let light = shown.light(color.map(|value| losses.finite(value)));
+            for (value, code) in light.into_iter().zip(codes.chunks_exact_mut(BYTES)) {
+                losses.bounded(value);
+                code.copy_from_slice(&color_code(value, x, window.y0 + y as i32));
+            }
+            let alpha = losses.finite(pixel[3]);
+            losses.bounded(alpha);
+            if !opaque {
+                codes[3 * BYTES..].copy_from_slice(&alpha_code(pixel[3]));
+            }
         }
-        losses.count(pixel[3]);
-        if !opaque {
-            samples.extend_from_slice(&alpha(pixel));
-        }
-    }
-    (if opaque { ColorType::Rgb } else { ColorType::Rgba }, samples)
+        losses
+    };
+    let rows = samples.par_chunks_mut(window.width() * BYTES * channels).enumerate();
+    let losses = rows.map(|(y, codes)| row(y, codes)).reduce(Losses::default, Losses::and);
+    (if opaque { ColorType::Rgb } else { ColorType::Rgba }, losses, samples)
 }
 
-/// Colour before it was multiplied by alpha; black where nothing covers the pixel, since no colour would show.
+/// Colour before it was multiplied by alpha. Where alpha's code is 0 no colour shows and black is written: a tiny alpha
+/// is so coarse in halves that colours would differ.
 #[inline]
 fn straight(&[r, g, b, a]: &[f32; 4]) -> [f32; 3] {
     if a >= 1.0 {
@@ -99,14 +139,22 @@ fn straight(&[r, g, b, a]: &[f32; 4]) -> [f32; 3] {
 }
 
 impl Losses {
+    /// The sample, or 0 for one that is not finite, which is counted.
+    #[inline]
+    fn finite(&mut self, value: f32) -> f32 {
+        let is_finite = value.is_finite();
+        self.dropped += u64::from(!is_finite);
+        if is_finite { value } else { 0.0 }
+    }
+
     /// Counts a sample that the range 0..1 does not hold.
     #[inline]
-    fn count(&mut self, value: f32) {
-        if !value.is_finite() {
-            self.dropped += 1;
-        } else if !(0.0..=1.0).contains(&value) {
-            self.clamped += 1;
-        }
+    fn bounded(&mut self, value: f32) {
+        self.clamped += u64::from(!(0.0..=1.0).contains(&value));
+    }
+
+    fn and(self, other: Losses) -> Losses {
+        Losses { clamped: self.clamped + other.clamped, dropped: self.dropped + other.dropped }
     }
 }
 
@@ -138,6 +186,13 @@ fn file(
 mod tests {
     use super::*;
     use crate::film::Window;
+    use crate::output::ToneMap;
+
+    const PLAIN: Coding = Coding {
+        bits: Bits::Eight,
+        display: Display { exposure: 0.0, white: None, tone_map: ToneMap::None },
+        dither: false,
+    };
 
     fn row(pixels: &[[f32; 4]]) -> Picture {
         let display = (pixels.len() as u32, 1);
@@ -155,7 +210,7 @@ mod tests {
     #[test]
     fn an_opaque_picture_has_no_alpha_and_is_clamped() {
         let picture = row(&[[0.5, 1.5, -0.25, 1.0], [0.0, f32::NAN, f32::INFINITY, 1.0]]);
-        let (bytes, losses) = encode(&picture, Bits::Eight, &Description::default()).unwrap();
+        let (bytes, losses) = encode(&picture, PLAIN, &Description::default()).unwrap();
         let (info, samples) = decoded(&bytes);
         assert_eq!((info.color_type, info.bit_depth), (ColorType::Rgb, BitDepth::Eight));
         assert_eq!(samples, [188, 255, 0, 0, 0, 0]);
@@ -165,21 +220,67 @@ mod tests {
     #[test]
     fn alpha_is_straight_and_not_bent_by_the_curve() {
         let picture = row(&[[0.25, 0.0, 0.5, 0.5], [3.0, 3.0, 3.0, 0.0], [1.0; 4]]);
-        let (bytes, losses) = encode(&picture, Bits::Eight, &Description::default()).unwrap();
+        let (bytes, losses) = encode(&picture, PLAIN, &Description::default()).unwrap();
         let (info, samples) = decoded(&bytes);
         assert_eq!(info.color_type, ColorType::Rgba);
         assert_eq!(samples, [188, 0, 255, 128, 0, 0, 0, 0, 255, 255, 255, 255]);
         assert_eq!(losses, Losses::default());
-        let (bytes, _) = encode(&picture, Bits::Sixteen, &Description::default()).unwrap();
+        let (bytes, _) = encode(&picture, Coding { bits: Bits::Sixteen, ..PLAIN }, &Description::default()).unwrap();
         let (info, samples) = decoded(&bytes);
         assert_eq!((info.color_type, info.bit_depth), (ColorType::Rgba, BitDepth::Sixteen));
         assert_eq!(samples[..8], [0xbc, 0x40, 0, 0, 0xff, 0xff, 0x80, 0]); // 0.735357 x 65535 = 48191.6
     }
 
+    /// What a file of halves gives is within a code of what the floats give, in every mode, however small alpha is.
+    #[test]
+    fn halves_give_the_same_codes_but_for_one() {
+        let mut seed = 1u32;
+        let mut random = || {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (seed >> 8) as f32 / (1 << 24) as f32
+        };
+        let pixels = (0..40_000).map(|_| {
+            let a = if random() < 0.2 { 1.0 } else { random().powi(1 + (random() * 9.0) as i32) };
+            [a * 3.0 * random().powi(6), a * random(), a * random().powi(3), a]
+        });
+        let floats = row(&pixels.collect::<Vec<_>>());
+        let half = |pixel: &[f32; 4]| pixel.map(|value| f16::from_f32(value).to_f32());
+        let halves = row(&floats.pixels.iter().map(half).collect::<Vec<_>>());
+        for tone_map in [ToneMap::None, ToneMap::Reinhard, ToneMap::Aces, ToneMap::Agx, ToneMap::Khronos] {
+            for dither in [true, false] {
+                let display = Display { exposure: 1.0, white: None, tone_map };
+                let codes = |picture| {
+                    let (bytes, _) =
+                        encode(picture, Coding { display, dither, ..PLAIN }, &Description::default()).unwrap();
+                    decoded(&bytes).1
+                };
+                let (a, b) = (codes(&floats), codes(&halves));
+                let off: Vec<_> = a.iter().zip(&b).map(|(a, b)| a.abs_diff(*b)).collect();
+                assert!(off.iter().all(|off| *off <= 1), "{tone_map:?} {dither}: {:?}", off.iter().max());
+                assert!(off.contains(&1));
+            }
+        }
+    }
+
+    #[test]
+    fn dither_goes_by_the_place_in_the_frame() {
+        let mut whole = Picture::new((24, 16), Window::full((24, 16)));
+        whole.pixels.iter_mut().enumerate().for_each(|(i, pixel)| *pixel = [i as f32 / 400.0, 0.2, 0.01, 1.0]);
+        let part = whole.crop(Window { x0: 5, y0: 3, x1: 23, y1: 12 }).unwrap();
+        let codes = |picture| decoded(&encode(picture, Coding::default(), &Description::default()).unwrap().0).1;
+        let (all, some) = (codes(&whole), codes(&part));
+        for (index, code) in some.as_chunks::<3>().0.iter().enumerate() {
+            let (x, y) = part.window.pixel(index);
+            assert_eq!(code, &all.as_chunks::<3>().0[whole.window.index(x, y).unwrap()], "{x} {y}");
+        }
+        let greens: std::collections::BTreeSet<_> = all.iter().skip(1).step_by(3).collect();
+        assert_eq!(greens.len(), 2);
+    }
+
     #[test]
     fn the_file_says_who_made_it_of_what() {
         let description = Description { scene: Some("сцена.toml".into()), ..Description::default() };
-        let (bytes, _) = encode(&row(&[[1.0; 4]]), Bits::Eight, &description).unwrap();
+        let (bytes, _) = encode(&row(&[[1.0; 4]]), PLAIN, &description).unwrap();
         let reader = png::Decoder::new(std::io::Cursor::new(&bytes)).read_info().unwrap();
         let info = reader.info();
         assert_eq!(info.uncompressed_latin1_text[0].text, description::software());
@@ -191,7 +292,7 @@ mod tests {
     fn what_is_not_whole_is_refused() {
         let mut picture = row(&[[1.0; 4]; 3]);
         picture.pixels.pop();
-        assert!(encode(&picture, Bits::Eight, &Description::default()).is_err());
+        assert!(encode(&picture, PLAIN, &Description::default()).is_err());
         assert!(encode_raster(&Raster { width: 2, height: 2, pixels: vec![[0; 3]; 3] }, "x").is_err());
         assert!(encode_raster(&Raster { width: 0, height: 0, pixels: vec![] }, "x").is_err());
     }

@@ -117,7 +117,7 @@ mod tests {
 
     use super::*;
     use crate::film::Window;
-    use crate::output::{self, Bits, Description, Options, srgb};
+    use crate::output::{self, Bits, Coding, Description, Options, srgb};
 
     fn picture() -> Picture {
         let mut picture = Picture::new((50, 40), Window { x0: 3, y0: 2, x1: 34, y1: 23 });
@@ -226,7 +226,7 @@ mod tests {
         let path = room.path().join("a.png");
         let picture = picture();
         for (bits, codes) in [(Bits::Eight, 255.0), (Bits::Sixteen, 65535.0)] {
-            let options = Options { bits, ..Options::default() };
+            let options = Options { coding: Coding { bits, dither: false, ..Coding::default() }, ..Options::default() };
             output::write(&path, &picture, options, &Description::default()).unwrap();
             let back = read(&path).unwrap();
             assert_eq!((back.display, back.window), ((31, 21), Window::full((31, 21))));
