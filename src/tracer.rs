@@ -131,10 +131,11 @@ impl<'s> Tracer<'s> {
 
     /// What the rays of some tiles of a batch meet first, from tile `first` on, and the tests that took.
     pub fn find_closest(&self, batch: &RayBatch, first: usize, found: &mut [Found]) -> Counts {
-        let (mut walk, mut tile) = (Walk::default(), Tile::empty());
-        for (i, found) in found.iter_mut().enumerate() {
-            batch.unpack(first + i, &mut tile);
-            self.tree.closest_tile(&mut tile, &mut walk);
+        let mut walk = Walk::default();
+        let mut tiles = vec![Tile::empty(); found.len()];
+        batch.unpack(first, &mut tiles);
+        self.tree.closest_tiles(&mut tiles, &mut walk);
+        for (tile, found) in tiles.iter().zip(found) {
             for (p, found) in found.packets.iter_mut().enumerate() {
                 let rays = &tile.packets[p];
                 *found = self.found(rays, rays.t_max, tile.hits[p]);
@@ -145,13 +146,17 @@ impl<'s> Tracer<'s> {
 
     /// Which rays of some tiles of a batch meet anything, a bit each, from tile `first` on, and the tests that took.
     pub fn find_occluded(&self, batch: &RayBatch, first: usize, dark: &mut [u64]) -> Counts {
-        let (mut walk, mut tile) = (Walk::default(), Tile::empty());
+        let mut walk = Walk::default();
+        let mut tiles = vec![Tile::empty(); dark.len()];
+        batch.unpack(first, &mut tiles);
         let live = |tile: &Tile| (0..PACKETS).map(|p| u64::from(tile.packets[p].live().bits()) << (p * LANES)).sum();
-        for (i, dark) in dark.iter_mut().enumerate() {
-            batch.unpack(first + i, &mut tile);
-            let before: u64 = live(&tile);
-            self.tree.occluded_tile(&mut tile, &mut walk);
-            *dark = before & !live(&tile);
+        for (tile, dark) in tiles.iter().zip(&mut *dark) {
+            *dark = live(tile);
+        }
+        self.tree.occluded_tiles(&mut tiles, &mut walk);
+        for (tile, dark) in tiles.iter().zip(dark) {
+            let after: u64 = live(tile);
+            *dark &= !after;
         }
         walk.counts
     }
@@ -170,7 +175,7 @@ impl<'s> Tracer<'s> {
     /// What the rays of one tile of a batch met, in full.
     pub fn hits(&self, batch: &RayBatch, i: usize, found: &Found) -> Vec<Option<Hit>> {
         let mut tile = Tile::empty();
-        batch.unpack(i, &mut tile);
+        batch.unpack(i, std::slice::from_mut(&mut tile));
         let packets = tile.packets.iter().zip(&found.packets);
         packets.flat_map(|(rays, found)| self.eight_hits(rays, found)).collect()
     }
@@ -257,16 +262,18 @@ impl RayBatch {
         self.tiles.len()
     }
 
-    #[inline(always)]
-    fn unpack(&self, i: usize, tile: &mut Tile) {
-        let Columns64 { dirs, t_min, t_max, common } = &self.tiles[i];
-        tile.renew(*common);
-        for p in 0..PACKETS {
-            let origin = match common {
-                Some(origin) => Vec3x8::splat(*origin),
-                None => self.origins[i][p],
-            };
-            tile.packets[p] = RayPacket::within(origin, dirs[p], t_min[p], t_max[p]);
+    /// Takes the rays of as many tiles, from tile `first` on.
+    fn unpack(&self, first: usize, tiles: &mut [Tile]) {
+        for (i, tile) in (first..).zip(tiles) {
+            let Columns64 { dirs, t_min, t_max, common } = &self.tiles[i];
+            tile.renew(*common);
+            for p in 0..PACKETS {
+                let origin = match common {
+                    Some(origin) => Vec3x8::splat(*origin),
+                    None => self.origins[i][p],
+                };
+                tile.packets[p] = RayPacket::within(origin, dirs[p], t_min[p], t_max[p]);
+            }
         }
     }
 }

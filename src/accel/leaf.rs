@@ -1,5 +1,6 @@
-//! Leaves: eight rays against one primitive, or one ray against eight.
+//! Leaves: eight rays against one primitive, or one ray after the other against eight.
 
+use super::line::Line;
 use super::node::Leaf;
 use crate::accel::Counts;
 use crate::lanes::{Float8, Hit8, LANES, Mask8, RayPacket, Vec3x8, bits, float8};
@@ -74,44 +75,53 @@ impl<const ANY: bool, const CULL: bool> PacketLeaf<'_, ANY, CULL> {
     }
 }
 
-/// One ray in a leaf: a lane is a primitive.
-pub struct RayLeaf<'a, const ANY: bool, const CULL: bool> {
+/// Some rays in a leaf, one after the other: a lane is a primitive.
+pub struct LineLeaf<'a, const ANY: bool, const CULL: bool> {
     pub stores: &'a Stores,
     pub leaf: Leaf,
-    /// The ray in all lanes; its `t_max` is the place of the best hit.
-    pub ray: &'a mut RayPacket,
-    pub hit: &'a mut RowRef,
+    /// Rays that take part.
+    pub rays: &'a [u16],
+    pub lines: &'a mut [Line],
     pub counts: &'a mut Counts,
 }
 
-impl<const ANY: bool, const CULL: bool> Visit for RayLeaf<'_, ANY, CULL> {
+impl<const ANY: bool, const CULL: bool> Visit for LineLeaf<'_, ANY, CULL> {
     type Output = ();
 
     #[inline(never)]
     fn visit<P: Part>(self, store: &Store<P>) {
         let Leaf { kind, block, .. } = self.leaf;
-        self.counts.kinds[kind as usize] += LANES as u64;
+        self.counts.kinds[kind as usize] += (self.rays.len() * LANES) as u64;
         let row = |lane: usize| block * LANES + lane;
-        let anchor = P::anchor(store.block(block), &self.ray.origin, |lane| store.part(row(lane)));
+        let rows = store.block(block);
         let hidden = if CULL { store.sides().lanes(row) } else { Hidden8::NONE };
-        let mut hit = P::hit::<CULL>(&anchor, self.ray, &hidden);
-        if hit.doubt.any() {
-            decide::<P, CULL>(store, row, self.ray, &mut hit, self.counts);
-        }
-        let lanes = hit.mask.bits();
-        if lanes == 0 {
-            return;
-        }
-        let (t, mut best) = (hit.t.to_array(), self.ray.t_max.as_array()[0]);
-        for lane in bits(lanes) {
-            let row = RowRef::new(kind, row(lane));
-            if t[lane] < best {
-                (best, *self.hit) = (t[lane], row);
-            } else if t[lane] == best {
-                *self.hit = self.stores.first_of(*self.hit, row);
+        for ray in self.rays {
+            let line = &mut self.lines[usize::from(*ray)];
+            let ray = line.splat();
+            let anchor = P::anchor(rows, &ray.origin, |lane| store.part(row(lane)));
+            let mut hit = P::hit::<CULL>(&anchor, &ray, &hidden);
+            if hit.doubt.any() {
+                decide::<P, CULL>(store, row, &ray, &mut hit, self.counts);
             }
+            let lanes = hit.mask.bits();
+            if lanes == 0 {
+                continue;
+            }
+            if ANY {
+                line.end(RowRef::new(kind, row(lanes.trailing_zeros() as usize)));
+                continue;
+            }
+            let (t, mut best) = (hit.t.as_array(), (line.t_max(), line.hit()));
+            for lane in bits(lanes) {
+                let row = RowRef::new(kind, row(lane));
+                if t[lane] < best.0 {
+                    best = (t[lane], row);
+                } else if t[lane] == best.0 {
+                    best.1 = self.stores.first_of(best.1, row);
+                }
+            }
+            line.set(best.0, best.1);
         }
-        self.ray.t_max = float8(best);
     }
 }
 

@@ -2,25 +2,26 @@
 //!
 //! One 8-wide tree serves two kinds of walk. Coherent rays go down as a tile of eight packets, first
 //! all of them against eight boxes, then a lane a packet; in a leaf a lane is a ray. Incoherent rays go
-//! one by one, a lane a box, and in a leaf a lane is a primitive.
+//! down as a stream, each for itself, a lane a box, and in a leaf a lane is a primitive.
 
 mod build;
 mod bundle;
-mod descend;
 mod leaf;
+mod line;
 mod node;
-mod single;
 mod stack;
+mod stream;
 #[cfg(test)]
 mod tests;
 mod tile;
 
 pub use self::tile::{PACKETS, Tile};
 
-use self::descend::Waiting;
-use self::node::{Beam, Child, Leaf, Node};
+use self::node::{Beam, Leaf, Node};
 use self::stack::Entry;
-use crate::lanes::{Ray, RayPacket};
+use self::stream::Stream;
+use self::tile::Waiting;
+use crate::lanes::Ray;
 use crate::plan::Kind;
 use crate::shapes::{RowRef, Stores};
 
@@ -41,9 +42,13 @@ pub struct Tree {
 pub struct Walk {
     /// What was done so far.
     pub counts: Counts,
-    companies: Vec<Entry<Waiting>>,
-    singles: Vec<Entry<Child>>,
-    beams: Vec<Beam>,
+    waiting: Vec<Entry<Waiting>>,
+    /// Rays of the packets of one tile.
+    own: Stream,
+    beams: Vec<(Beam, usize)>,
+    /// Rays of packets that go different ways, and by packet its tile and its place there.
+    apart: Stream,
+    parted: Vec<(u32, u32)>,
 }
 
 /// Tests done, in pairs of a ray or packet and a box or primitive.
@@ -90,31 +95,31 @@ impl Tree {
         self.nodes.capacity() * size_of::<Node>()
     }
 
-    /// Makes room for what waits on the way down.
-    fn make_room(&self, walk: &mut Walk) {
-        if walk.singles.len() < self.room {
-            walk.singles.resize(self.room, Entry::default());
-            walk.companies.resize(2 * self.room, Entry::default());
-        }
-    }
-
     /// What one ray meets first, and where.
     pub fn closest(&self, ray: &Ray, walk: &mut Walk) -> (f32, RowRef) {
-        if !ray.is_valid() {
-            return (ray.t_max, RowRef::MISS);
+        let mut tile = Tile::of_one(ray);
+        self.closest_tiles(std::slice::from_mut(&mut tile), walk);
+        match tile.hit(0, 0) {
+            RowRef::MISS => (ray.t_max, RowRef::MISS),
+            row => (tile.packets[0].t_max.as_array()[0], row),
         }
-        self.make_room(walk);
-        let mut ray = RayPacket::splat(ray);
-        let row = match self.culls {
-            true => self.walk_single::<false, true>(&mut ray, walk),
-            false => self.walk_single::<false, false>(&mut ray, walk),
-        };
-        (ray.t_max.as_array()[0], row)
     }
 
     /// Whether one ray meets anything, either side of it.
     pub fn occluded(&self, ray: &Ray, walk: &mut Walk) -> bool {
-        self.make_room(walk);
-        ray.is_valid() && self.walk_single::<true, false>(&mut RayPacket::splat(ray), walk) != RowRef::MISS
+        let mut tile = Tile::of_one(ray);
+        self.occluded_tiles(std::slice::from_mut(&mut tile), walk);
+        ray.is_valid() && !tile.packets[0].live().any()
+    }
+}
+
+impl Walk {
+    fn make_room(&mut self, room: usize) {
+        if self.waiting.len() < room {
+            self.waiting.resize(room, Entry::default());
+        }
+        if self.beams.is_empty() {
+            self.beams.resize(PACKETS, (Beam::default(), 0));
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::lanes::{Columns, Float8, LANES, Mask8, RayPacket, UNIT_ROUNDOFF, float8};
+use crate::lanes::{Columns, Float8, LANES, Mask8, UNIT_ROUNDOFF, float8};
 use crate::plan::Kind;
 
 /// Eight boxes and what they hold. An empty slot has an inverted box, which nothing meets.
@@ -92,6 +92,16 @@ impl Node {
         Child(self.columns[CHILDREN].as_array()[slot % LANES].to_bits())
     }
 
+    /// The leaves among its children.
+    pub fn leaves(&self) -> impl Iterator<Item = Leaf> {
+        // The root is nobody's child: an empty slot.
+        let child = |slot| match self.child(slot).content() {
+            Content::Leaf(leaf) => Some(leaf),
+            Content::Node(_) => None,
+        };
+        (0..LANES).filter_map(child)
+    }
+
     /// The longest edge of the box of a slot, in all lanes.
     #[inline(always)]
     pub fn size(&self, slot: usize) -> Float8 {
@@ -100,8 +110,8 @@ impl Node {
 
     /// The planes of all boxes that are entered and left by on an axis, a lane a child.
     #[inline(always)]
-    fn planes(&self, near: usize) -> (&Float8, &Float8) {
-        (&self.columns[near % 8], &self.columns[(near ^ 1) % 8])
+    pub fn planes(&self, near: usize) -> (Float8, Float8) {
+        (self.columns[near % 8], self.columns[(near ^ 1) % 8])
     }
 }
 
@@ -111,7 +121,7 @@ pub fn near_planes(back: [bool; 3]) -> [usize; 3] {
 }
 
 /// Bounds of some rays: for one ray they are the ray.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Default, Clone, Copy)]
 pub struct Beam {
     /// Origins furthest along the direction, which reach a plane first.
     pub origin_near: [Float8; 3],
@@ -172,25 +182,17 @@ impl Beam {
     /// Where each of the rays may enter one box of a node at the earliest, and which may meet it before `limit`.
     #[inline(always)]
     pub fn meets_child(&self, node: &Node, slot: usize, limit: Float8) -> (Float8, Mask8) {
-        let of_child = |plane: &Float8| float8(plane.as_array()[slot % LANES]);
-        let planes = |k: usize| {
-            let (near, far) = node.planes(self.near[k]);
-            (of_child(near), of_child(far))
-        };
-        self.meets(planes, limit)
+        let plane = |column: usize| float8(node.columns[column % 8].as_array()[slot % LANES]);
+        self.meets(|k| (plane(self.near[k]), plane(self.near[k] ^ 1)), limit)
     }
 
     #[inline(always)]
-    fn meets<P: std::borrow::Borrow<Float8>>(
-        &self,
-        planes: impl Fn(usize) -> (P, P),
-        limit: Float8,
-    ) -> (Float8, Mask8) {
+    fn meets(&self, planes: impl Fn(usize) -> (Float8, Float8), limit: Float8) -> (Float8, Mask8) {
         let (mut entry, mut exit) = (self.start, limit);
         for k in 0..3 {
             let (near, far) = planes(k);
-            let near = (*near.borrow() - self.origin_near[k]) * self.inv_near[k];
-            let far = (*far.borrow() - self.origin_far[k]) * self.inv_far[k];
+            let near = (near - self.origin_near[k]) * self.inv_near[k];
+            let far = (far - self.origin_far[k]) * self.inv_far[k];
             entry = near.fast_max(entry);
             if self.split[k] {
                 entry = far.fast_max(entry);
@@ -199,49 +201,5 @@ impl Beam {
             }
         }
         (entry, Mask8::le(entry, exit))
-    }
-}
-
-/// One ray, in all lanes.
-#[derive(Debug, Clone, Copy)]
-pub struct Line {
-    origin: [Float8; 3],
-    inv: [Float8; 3],
-    near: [usize; 3],
-    start: Float8,
-    /// Whether it begins behind its origin.
-    behind: bool,
-}
-
-impl Line {
-    /// Takes the ray of all lanes.
-    #[inline(always)]
-    pub fn new(ray: &RayPacket) -> Self {
-        let dir = [ray.dir.x, ray.dir.y, ray.dir.z];
-        let inv = dir.map(|d| {
-            let magnitude = float8(1.0) / d.abs().fast_max(float8(LEAST_DIRECTION));
-            Mask8::sign(d).select(-magnitude, magnitude)
-        });
-        let back = dir.map(|d| d.as_array()[0].is_sign_negative());
-        let behind = ray.t_min.as_array()[0] < 0.0;
-        let origin = [ray.origin.x, ray.origin.y, ray.origin.z];
-        Line { origin, inv, near: near_planes(back), start: ray.t_min, behind }
-    }
-
-    /// Where the ray may enter the boxes of a node at the earliest, and which boxes it may meet before `limit`.
-    #[inline(always)]
-    pub fn meets(&self, node: &Node, limit: Float8) -> (Float8, Mask8) {
-        let at = |k: usize| {
-            let (near, far) = node.planes(self.near[k]);
-            ((*near - self.origin[k]) * self.inv[k], (*far - self.origin[k]) * self.inv[k])
-        };
-        let (x, y, z) = (at(0), at(1), at(2));
-        let entry = x.0.fast_max(y.0).fast_max(z.0.fast_max(self.start));
-        let exit = x.1.fast_min(y.1).fast_min(z.1);
-        let exit = match self.behind {
-            false => exit * float8(OUTWARD),
-            true => exit.abs().mul_add(float8(OUTWARD - 1.0), exit),
-        };
-        (entry, Mask8::le(entry, exit.fast_min(limit)))
     }
 }

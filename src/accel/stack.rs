@@ -1,6 +1,6 @@
 //! What waits to be opened.
 
-use crate::lanes::{Float8, LANES, Mask8};
+use crate::lanes::{Float8, LANES};
 
 /// Something that may hold hits from `entry` on.
 #[derive(Debug, Clone, Copy, Default)]
@@ -24,20 +24,20 @@ impl<'a, T: Copy> Stack<'a, T> {
         Stack { items, top: 0 }
     }
 
-    /// What of the room is still free.
-    #[inline(always)]
-    pub fn free(&mut self) -> &mut [Entry<T>] {
-        &mut self.items[self.top..]
-    }
-
     /// The next one that begins no further away than `far`.
     #[inline(always)]
     pub fn pop(&mut self, far: f32) -> Option<T> {
+        self.pop_if(|entry, _| entry <= far)
+    }
+
+    /// The next one that is still of use; those before it are dropped.
+    #[inline(always)]
+    pub fn pop_if(&mut self, useful: impl Fn(f32, &T) -> bool) -> Option<T> {
         while self.top > 0 {
             self.top -= 1;
-            let Entry { entry, what } = self.items[self.top];
-            if entry <= far {
-                return Some(what);
+            let Entry { entry, what } = &self.items[self.top];
+            if useful(*entry, what) {
+                return Some(*what);
             }
         }
         None
@@ -48,11 +48,10 @@ impl<'a, T: Copy> Stack<'a, T> {
     #[inline(always)]
     pub fn nearest_first<const ANY: bool>(
         &mut self,
-        entries: Float8,
-        met: Mask8,
+        entries: &Float8,
+        mut slots: u32,
         what: impl Fn(usize) -> T,
     ) -> Option<T> {
-        let mut slots = met.bits();
         if slots == 0 {
             return None;
         }

@@ -26,8 +26,8 @@ fn compare(scene: &Scene, rays: &[Ray]) -> Tally {
     for chunk in rays.chunks(PACKETS * LANES) {
         let (mut seen, mut lit) = (tile(chunk), tile(chunk));
         let before = lit.packets.map(|rays| rays.live().bits());
-        tree.closest_tile(&mut seen, &mut walk);
-        tree.occluded_tile(&mut lit, &mut walk);
+        tree.closest_tiles(std::slice::from_mut(&mut seen), &mut walk);
+        tree.occluded_tiles(std::slice::from_mut(&mut lit), &mut walk);
         for (i, ray) in chunk.iter().enumerate() {
             let (p, lane) = (i / LANES, i % LANES);
             let want = brute::closest(stores, ray, tree.culls).map(|(t, row)| (t.to_bits(), row));

@@ -1,11 +1,12 @@
 //! 64 rays down the tree: a lane is a packet, in leaves a ray.
 
 use super::bundle::Bundle;
-use super::descend::{Company, Room};
 use super::leaf::PacketLeaf;
 use super::node::{Beam, Child, Content, Leaf, Node, reach};
-use super::{Tree, Walk};
-use crate::lanes::{Columns, Float8, Mask8, RayPacket, Vec3x8, bits, float8, greatest};
+use super::stack::{Entry, Stack};
+use super::stream::Stream;
+use super::{Counts, Tree, Walk};
+use crate::lanes::{Columns, Float8, LANES, Mask8, Ray, RayPacket, Vec3x8, bits, float8, greatest};
 use crate::shapes::RowRef;
 
 /// Packets of a tile.
@@ -25,31 +26,39 @@ pub struct Tile {
 /// A packet that is so much wider than a box goes on as rays.
 const WIDE: f32 = 1.0;
 
-/// So few rays of a packet go on alone.
-const FEW_RAYS: u32 = 2;
+/// Of so many nodes with leaves alone, every leaf is asked by every packet: cheaper than finding out.
+const TINY: usize = 1;
+
+/// A child that some packets may meet.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Waiting {
+    node: u32,
+    slot: u8,
+    /// Packets that may meet the node, a bit each.
+    members: u8,
+}
 
 /// The packets of a tile on their way.
 struct Packets<'a, const ANY: bool, const CULL: bool> {
+    tree: &'a Tree,
+    tile: &'a mut Tile,
+    /// Bounds of each packet, a lane a packet, and of all together.
     beam: Beam,
     whole: Beam,
     /// Widths of origins and directions.
     widths: [Float8; 2],
+    /// How far each of them still looks, below everything once it is done, and the greatest of these.
     far: Float8,
     farthest: Float8,
-    tile: &'a mut Tile,
-    /// Bounds of the rays of each packet, a lane a ray, where they are known already.
-    beams: &'a mut [Beam],
-    known: u32,
+    own: Own<'a>,
 }
 
-/// The rays of one packet on their way.
-struct Rays<'a, const ANY: bool, const CULL: bool> {
-    beam: &'a Beam,
-    whole: Beam,
-    far: Float8,
-    farthest: Float8,
-    packet: usize,
-    tile: &'a mut Tile,
+/// The rays of the packets of a tile, where they are known already.
+struct Own<'a> {
+    /// Bounds of the rays of each packet, a lane a ray, and the number of the packet in the stream.
+    beams: &'a mut [(Beam, usize)],
+    stream: &'a mut Stream,
+    known: u32,
 }
 
 impl Tile {
@@ -61,6 +70,13 @@ impl Tile {
     /// Dead rays.
     pub fn empty() -> Self {
         Tile::new([RayPacket::dead(); PACKETS], None)
+    }
+
+    /// One ray, all else dead.
+    pub fn of_one(ray: &Ray) -> Self {
+        let mut tile = Tile::empty();
+        tile.packets[0] = RayPacket::gather(std::slice::from_ref(ray));
+        tile
     }
 
     /// Takes the tile for new rays, which have met nothing yet; its packets are still to be set.
@@ -76,88 +92,101 @@ impl Tile {
 }
 
 impl Tree {
-    /// Finds what each ray of a tile meets first.
-    pub fn closest_tile(&self, tile: &mut Tile, walk: &mut Walk) {
+    /// Finds what each ray of some tiles meets first.
+    pub fn closest_tiles(&self, tiles: &mut [Tile], walk: &mut Walk) {
         match self.culls {
-            true => self.walk_tile::<false, true>(tile, walk),
-            false => self.walk_tile::<false, false>(tile, walk),
+            true => self.walk_tiles::<false, true>(tiles, walk),
+            false => self.walk_tiles::<false, false>(tiles, walk),
         }
     }
 
-    /// Finds which rays of a tile meet anything: those lanes are dead afterwards.
-    pub fn occluded_tile(&self, tile: &mut Tile, walk: &mut Walk) {
-        self.walk_tile::<true, false>(tile, walk);
+    /// Finds which rays of some tiles meet anything: those lanes are dead afterwards.
+    pub fn occluded_tiles(&self, tiles: &mut [Tile], walk: &mut Walk) {
+        self.walk_tiles::<true, false>(tiles, walk);
     }
 
-    fn walk_tile<const ANY: bool, const CULL: bool>(&self, tile: &mut Tile, walk: &mut Walk) {
-        let live = (0..PACKETS).map(|p| u32::from(tile.packets[p].live().any()) << p).sum();
-        if live == 0 {
-            return;
+    /// Packets that go the same way go together; the rays of the others are gathered from many tiles.
+    fn walk_tiles<const ANY: bool, const CULL: bool>(&self, tiles: &mut [Tile], walk: &mut Walk) {
+        walk.make_room(self.room);
+        for tiles in tiles.chunks_mut(Stream::MOST / PACKETS) {
+            walk.apart.clear();
+            let mut parted = std::mem::take(&mut walk.parted);
+            for (i, tile) in tiles.iter_mut().enumerate() {
+                let apart = self.walk_tile::<ANY, CULL>(tile, walk);
+                parted.extend(bits(apart).map(|p| (i as u32, p as u32)));
+                for p in bits(apart) {
+                    let number = walk.apart.add(&tile.packets[p], tile.hits[p]);
+                    walk.apart.wait(number, tile.packets[p].live().bits());
+                }
+            }
+            self.descend_rays::<ANY, CULL>(Child::node(0), &mut walk.apart, &mut walk.counts);
+            for (number, (i, p)) in parted.drain(..).enumerate() {
+                let (tile, p) = (&mut tiles[i as usize], p as usize);
+                let live = tile.packets[p].live().bits();
+                walk.apart.hand_back::<ANY>(number, live, &mut tile.packets[p], &mut tile.hits[p]);
+            }
+            walk.parted = parted;
         }
-        self.make_room(walk);
-        let one_by_one = match self.one_by_one {
-            true => live,
-            false => self.walk_together::<ANY, CULL>(live, tile, walk),
-        };
-        bits(one_by_one).for_each(|p| self.walk_one_by_one::<ANY, CULL>(p, tile, walk));
     }
 
-    /// Packets that go the same way, all together or each on its own. Left are those whose own rays do not.
-    fn walk_together<const ANY: bool, const CULL: bool>(&self, all: u32, tile: &mut Tile, walk: &mut Walk) -> u32 {
+    /// Walks with the packets that go the same way, all together or each on its own. Left are those whose own rays
+    /// do not, which have been held against the planes.
+    fn walk_tile<const ANY: bool, const CULL: bool>(&self, tile: &mut Tile, walk: &mut Walk) -> u32 {
+        let live_packets = |tile: &Tile| (0..PACKETS).map(|p| u32::from(tile.packets[p].live().any()) << p).sum();
+        let mut all = live_packets(tile);
+        for leaf in &self.planes {
+            tile.meet::<ANY, CULL>(self, *leaf, all, &mut walk.counts);
+        }
+        if ANY && !self.planes.is_empty() {
+            all = live_packets(tile);
+        }
+        if all == 0 || self.nodes.is_empty() {
+            return 0;
+        }
+        if self.one_by_one || (all == 1 && tile.packets[0].live().bits() == 1) {
+            return all;
+        }
         let bundle = Bundle::new::<ANY>(tile, all);
         let merged = bundle.merged(all);
         let together = merged.narrow(self.size) != 0;
         let live = if together { all } else { all & bundle.narrow(self.size) };
-        if live == 0 {
-            return all;
+        if live != 0 {
+            self.walk_together::<ANY, CULL>(&bundle, &merged, live, together, tile, walk);
         }
-        for leaf in &self.planes {
-            tile.meet::<ANY, CULL>(self, *leaf, live, walk);
+        if live != all && self.nodes.len() <= TINY {
+            self.meet_all::<ANY, CULL>(all & !live, tile, walk);
+            return 0;
         }
-        let (mut beams, mut room) = (std::mem::take(&mut walk.beams), std::mem::take(&mut walk.companies));
-        let (beam, whole) = (bundle.beam(live), merged.beam(live));
-        beams.resize(PACKETS, beam);
-        let (widths, far, farthest) = (bundle.widths(), reach(bundle.far), Float8::ZERO);
-        let mut packets =
-            Packets::<ANY, CULL> { beam, whole, widths, far, farthest, tile, beams: &mut beams, known: 0 };
-        packets.look_again(live);
-        match (self.nodes.is_empty(), together) {
-            (true, _) => {}
-            (_, true) => self.descend::<ANY, _>(&mut packets, Child::node(0), live, &mut room, walk),
-            (_, false) => packets.alone(self, Child::node(0), live, &mut room, walk),
-        }
-        (walk.beams, walk.companies) = (beams, room);
         all & !live
     }
 
-    /// One ray of a tile, from some child on.
-    fn go_on<const ANY: bool, const CULL: bool>(
-        &self,
-        from: Child,
-        tile: &mut Tile,
-        (packet, lane): (usize, usize),
-        walk: &mut Walk,
-    ) {
-        let (rays, hits) = (&mut tile.packets[packet], &mut tile.hits[packet]);
-        let mut ray = rays.broadcast(lane);
-        let mut row = RowRef::from_lane(hits.as_array()[lane]);
-        self.descend_single::<ANY, CULL>(from, &mut ray, &mut row, walk);
-        if ANY && row != RowRef::MISS {
-            rays.t_min.as_mut_array()[lane] = f32::INFINITY;
-            rays.t_max.as_mut_array()[lane] = f32::NEG_INFINITY;
-        } else {
-            rays.t_max.as_mut_array()[lane] = ray.t_max.as_array()[0];
-            hits.as_mut_array()[lane] = row.to_lane();
+    /// Holds some packets against everything there is.
+    fn meet_all<const ANY: bool, const CULL: bool>(&self, packets: u32, tile: &mut Tile, walk: &mut Walk) {
+        for leaf in self.nodes.iter().flat_map(Node::leaves) {
+            tile.meet::<ANY, CULL>(self, leaf, packets, &mut walk.counts);
         }
     }
 
-    fn walk_one_by_one<const ANY: bool, const CULL: bool>(&self, packet: usize, tile: &mut Tile, walk: &mut Walk) {
-        for leaf in &self.planes {
-            tile.meet::<ANY, CULL>(self, *leaf, 1 << packet, walk);
-        }
-        if !self.nodes.is_empty() {
-            let live = tile.packets[packet].live();
-            live.lanes().for_each(|lane| self.go_on::<ANY, CULL>(Child::node(0), tile, (packet, lane), walk));
+    fn walk_together<const ANY: bool, const CULL: bool>(
+        &self,
+        bundle: &Bundle,
+        merged: &Bundle,
+        live: u32,
+        together: bool,
+        tile: &mut Tile,
+        walk: &mut Walk,
+    ) {
+        let (beam, whole) = (bundle.beam(live), merged.beam(live));
+        let Walk { counts, waiting, own, beams, .. } = walk;
+        own.clear();
+        let own = Own { beams, stream: own, known: 0 };
+        let (widths, far, farthest) = (bundle.widths(), reach(bundle.far), Float8::ZERO);
+        let mut packets = Packets::<ANY, CULL> { tree: self, tile, beam, whole, widths, far, farthest, own };
+        packets.look_again(live);
+        if together {
+            packets.descend(live, waiting, counts);
+        } else {
+            packets.alone(Child::node(0), None, live, counts);
         }
     }
 }
@@ -165,19 +194,63 @@ impl Tree {
 impl Tile {
     /// Holds some packets against a leaf: those in which something was met.
     #[inline(always)]
-    fn meet<const ANY: bool, const CULL: bool>(&mut self, tree: &Tree, leaf: Leaf, mask: u32, walk: &mut Walk) -> u32 {
-        let (stores, counts) = (&tree.stores, &mut walk.counts);
+    fn meet<const ANY: bool, const CULL: bool>(
+        &mut self,
+        tree: &Tree,
+        leaf: Leaf,
+        mask: u32,
+        counts: &mut Counts,
+    ) -> u32 {
+        let stores = &tree.stores;
         let (packets, hits) = (&mut self.packets[..], &mut self.hits[..]);
         let common = self.common.map(Vec3x8::splat);
         stores.visit(leaf.kind, PacketLeaf::<ANY, CULL> { stores, leaf, packets, hits, mask, common, counts })
     }
 }
 
-impl<const ANY: bool, const CULL: bool> Company for Packets<'_, ANY, CULL> {
-    fn beam(&self) -> &Beam {
-        &self.beam
+impl<const ANY: bool, const CULL: bool> Packets<'_, ANY, CULL> {
+    /// Takes some packets down from the root: a node is opened by all of them together, a lane a child, and each
+    /// child is then held against every one of them, a lane a packet.
+    fn descend(&mut self, members: u32, room: &mut [Entry<Waiting>], counts: &mut Counts) {
+        let tree = self.tree;
+        let mut stack = Stack::new(room);
+        let mut next = Some((Child::node(0), members));
+        while let Some((child, members)) = next {
+            let mut nearest = None;
+            match child.content() {
+                Content::Leaf(leaf) => {
+                    let touched = self.tile.meet::<ANY, CULL>(tree, leaf, members, counts);
+                    self.look_again(touched);
+                }
+                Content::Node(index) => {
+                    counts.boxes += LANES as u64;
+                    let (entries, met) = self.open(&tree.nodes[index], members);
+                    let (node, members) = (index as u32, members as u8);
+                    let waiting = |slot| Waiting { node, slot: slot as u8, members };
+                    nearest = stack.nearest_first::<ANY>(&entries, met.bits(), waiting);
+                }
+            }
+            next = loop {
+                let farthest = self.farthest.as_array()[0];
+                let Some(waiting) = nearest.take().or_else(|| stack.pop(farthest)) else { break None };
+                let Waiting { node, slot, members } = waiting;
+                let (node, slot) = (&tree.nodes[node as usize], usize::from(slot));
+                counts.boxes += LANES as u64;
+                let (entries, met) = self.beam.meets_child(node, slot, self.far);
+                let met = met.bits() & u32::from(members);
+                let wide = self.wider_than(node.size(slot), entries) & met;
+                if wide != 0 {
+                    self.alone(node.child(slot), Some((node, slot)), wide, counts);
+                }
+                if met != wide {
+                    break Some((node.child(slot), met & !wide));
+                }
+            };
+        }
     }
 
+    /// Where some of them together may enter the boxes of a node at the earliest, and which they may meet.
+    #[inline(always)]
     fn open(&self, node: &Node, members: u32) -> (Float8, Mask8) {
         if members & (members - 1) == 0 {
             let p = members.trailing_zeros() as usize;
@@ -186,44 +259,47 @@ impl<const ANY: bool, const CULL: bool> Company for Packets<'_, ANY, CULL> {
         self.whole.meets_children(node, self.farthest)
     }
 
-    fn far(&self) -> Float8 {
-        self.far
-    }
-
-    fn farthest(&self) -> f32 {
-        self.farthest.as_array()[0]
-    }
-
+    /// Packets that at these places are wider than a box.
+    #[inline(always)]
     fn wider_than(&self, size: Float8, places: Float8) -> u32 {
         Mask8::gt(places.mul_add(self.widths[1], self.widths[0]), size * float8(WIDE)).bits()
     }
 
-    fn part_ways(&self, _: &Content, _: u32) -> bool {
-        false
-    }
-
-    fn alone(&mut self, tree: &Tree, child: Child, members: u32, room: &mut Room, walk: &mut Walk) {
+    /// Lets the rays of some packets that meet a child go on alone; `slot` is where it lies.
+    #[inline(never)]
+    fn alone(&mut self, child: Child, slot: Option<(&Node, usize)>, members: u32, counts: &mut Counts) {
+        let (mut touched, mut waiting) = (0, [0; PACKETS]);
         for p in bits(members) {
-            let live = self.tile.packets[p].live().bits();
-            if self.known >> p & 1 == 0 {
-                self.beams[p] = Bundle::of_rays(&self.tile.packets[p]).beam(live);
-                self.known |= 1 << p;
+            let (rays, hits) = (&self.tile.packets[p], &self.tile.hits[p]);
+            let mut lanes = rays.live().bits();
+            self.own.know(p, rays, hits);
+            if let Some((node, slot)) = slot {
+                counts.boxes += LANES as u64;
+                lanes &= self.own.beams[p].0.meets_child(node, slot, reach(rays.t_max)).1.bits();
             }
-            let (whole, farthest) = (self.beam.broadcast(p), self.far.broadcast(p));
-            let far = reach(self.tile.packets[p].t_max);
-            let mut rays = Rays::<ANY, CULL> { beam: &self.beams[p], whole, far, farthest, packet: p, tile: self.tile };
-            tree.descend::<ANY, _>(&mut rays, child, live, room, walk);
+            match child.content() {
+                Content::Leaf(leaf) if 2 * lanes.count_ones() > leaf.count as u32 => {
+                    touched |= self.tile.meet::<ANY, CULL>(self.tree, leaf, 1 << p, counts);
+                }
+                _ if lanes != 0 => {
+                    self.own.stream.refresh(self.own.beams[p].1, lanes, rays, hits);
+                    self.own.stream.wait(self.own.beams[p].1, lanes);
+                    waiting[p] = lanes;
+                    touched |= 1 << p;
+                }
+                _ => {}
+            }
         }
-        self.look_again(members);
-    }
-
-    fn leaf(&mut self, tree: &Tree, leaf: Leaf, members: u32, walk: &mut Walk) {
-        let touched = self.tile.meet::<ANY, CULL>(tree, leaf, members, walk);
+        self.tree.descend_rays::<ANY, CULL>(child, self.own.stream, counts);
+        for (p, lanes) in waiting.into_iter().enumerate() {
+            let (rays, hits) = (&mut self.tile.packets[p], &mut self.tile.hits[p]);
+            if lanes != 0 {
+                self.own.stream.hand_back::<ANY>(self.own.beams[p].1, lanes, rays, hits);
+            }
+        }
         self.look_again(touched);
     }
-}
 
-impl<const ANY: bool, const CULL: bool> Packets<'_, ANY, CULL> {
     /// Sees how far some packets still look.
     #[inline(always)]
     fn look_again(&mut self, packets: u32) {
@@ -240,56 +316,14 @@ impl<const ANY: bool, const CULL: bool> Packets<'_, ANY, CULL> {
     }
 }
 
-impl<const ANY: bool, const CULL: bool> Company for Rays<'_, ANY, CULL> {
-    fn beam(&self) -> &Beam {
-        self.beam
-    }
-
-    fn open(&self, node: &Node, _: u32) -> (Float8, Mask8) {
-        self.whole.meets_children(node, self.farthest)
-    }
-
-    fn far(&self) -> Float8 {
-        self.far
-    }
-
-    fn farthest(&self) -> f32 {
-        self.farthest.as_array()[0]
-    }
-
-    fn wider_than(&self, _: Float8, _: Float8) -> u32 {
-        0
-    }
-
-    fn part_ways(&self, content: &Content, members: u32) -> bool {
-        match content {
-            Content::Node(_) => members.count_ones() <= FEW_RAYS,
-            Content::Leaf(leaf) => 2 * members.count_ones() <= leaf.count as u32,
-        }
-    }
-
-    fn alone(&mut self, tree: &Tree, child: Child, members: u32, _: &mut Room, walk: &mut Walk) {
-        bits(members).for_each(|lane| tree.go_on::<ANY, CULL>(child, self.tile, (self.packet, lane), walk));
-        self.look_again();
-    }
-
-    fn leaf(&mut self, tree: &Tree, leaf: Leaf, _: u32, walk: &mut Walk) {
-        if self.tile.meet::<ANY, CULL>(tree, leaf, 1 << self.packet, walk) != 0 {
-            self.look_again();
-        }
-    }
-}
-
-impl<const ANY: bool, const CULL: bool> Rays<'_, ANY, CULL> {
-    /// Sees how far the rays still look.
+impl Own<'_> {
+    /// Makes the rays of a packet known.
     #[inline(always)]
-    fn look_again(&mut self) {
-        let rays = &self.tile.packets[self.packet];
-        self.far = reach(rays.t_max);
-        match ANY {
-            // The whole may be seen from the other end: it looks all the way as long as some ray looks.
-            true if rays.live().any() => {}
-            _ => self.farthest = float8(greatest(self.far)),
+    fn know(&mut self, p: usize, rays: &RayPacket, hits: &Float8) {
+        if self.known >> p & 1 == 0 {
+            let beam = Bundle::of_rays(rays).beam(rays.live().bits());
+            self.beams[p] = (beam, self.stream.add(rays, *hits));
+            self.known |= 1 << p;
         }
     }
 }

@@ -109,7 +109,7 @@ impl<'s> Direct<'s> {
     fn trace<R: Record>(&self, mut wave: Wave, sink: &mut Sink<R>, waiting: &mut Vec<Later>) {
         let live: [u32; PACKETS] = std::array::from_fn(|p| wave.tile.packets[p].live().bits());
         let redecided = sink.room.walk.counts.redecided;
-        self.tree.closest_tile(&mut wave.tile, &mut sink.room.walk);
+        self.tree.closest_tiles(std::slice::from_mut(&mut wave.tile), &mut sink.room.walk);
         sink.room.rays.redecided[wave.kind as usize] += sink.room.walk.counts.redecided - redecided;
         let mut shaded = std::mem::take(&mut sink.room.shaded);
         for (p, live) in live.into_iter().enumerate().filter(|(_, live)| *live != 0) {

@@ -76,7 +76,7 @@ impl Direct<'_> {
         }
         let told = R::ON.then_some(tile.packets);
         let redecided = sink.room.walk.counts.redecided;
-        self.tree.occluded_tile(&mut tile, &mut sink.room.walk);
+        self.tree.occluded_tiles(std::slice::from_mut(&mut tile), &mut sink.room.walk);
         let counts = &mut sink.room.rays;
         counts.redecided[RayKind::Shadow as usize] += sink.room.walk.counts.redecided - redecided;
         for (p, lit) in lit.iter_mut().enumerate() {

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::{Float8, LANES, Vec3x8, float8};
 
 /// One or several quantities of eight rows, a lane a row.
-pub trait Columns: Copy {
+pub trait Columns: Copy + Send + Sync {
     /// The quantities of one row in f64.
     type One: Copy;
     /// Eight rows, rounded to f32; missing ones are NaN, which no ray can hit.

@@ -1,6 +1,8 @@
 //! All parts of one kind: a structure of arrays in blocks of eight rows, so that a leaf of the tree lies in
 //! neighbouring cache lines.
 
+use rayon::prelude::*;
+
 use super::Part;
 use crate::lanes::{Columns, LANES, Mask8};
 use crate::plan::Owner;
@@ -21,27 +23,31 @@ pub struct Store<P: Part> {
 #[repr(align(64))]
 struct Block<R>(R);
 
-/// What a block holds: some parts in a row, and whose they are.
-#[derive(Debug)]
+/// What a block holds: some parts in a row.
+#[derive(Debug, Clone, Copy)]
 struct Group {
     first: u32,
     count: u32,
-    owners: [Owner; LANES],
 }
 
 impl<P: Part> Store<P> {
     /// Stores the parts in this order, in groups of these sizes, 1 to 8.
     pub fn new(parts: Vec<P>, sizes: impl IntoIterator<Item = usize>, visible: &[Visible]) -> Self {
-        let (mut blocks, mut groups, mut shown, mut first) = (Vec::new(), Vec::new(), Vec::new(), 0);
-        for count in sizes {
-            let group = &parts[first..first + count];
-            let owners = std::array::from_fn(|lane| group[lane.min(count - 1)].owner());
-            blocks.push(Block(P::Rows::pack(std::array::from_fn(|lane| group.get(lane).map(P::row)))));
-            groups.push(Group { first: first as u32, count: count as u32, owners });
-            shown.extend(owners.map(|owner| visible[owner.material as usize]));
+        let mut first = 0;
+        let group = |count| {
             first += count;
+            Group { first: (first - count) as u32, count: count as u32 }
+        };
+        let groups: Vec<Group> = sizes.into_iter().map(group).collect();
+        let parts_of = |group: &Group| &parts[group.first as usize..][..group.count as usize];
+        let pack = |group: &[P]| Block(P::Rows::pack(std::array::from_fn(|lane| group.get(lane).map(P::row))));
+        let blocks = groups.par_iter().map(|group| pack(parts_of(group))).collect();
+        let mut sides = Sides::default();
+        if visible.iter().any(|side| *side != Visible::Both) {
+            let shown = |row| visible[parts[part_of(&groups, row)].owner().material as usize];
+            sides = Sides::new((0..groups.len() * LANES).map(shown).collect());
         }
-        Store { blocks, groups, sides: Sides::new(shown), parts }
+        Store { blocks, groups, sides, parts }
     }
 
     /// The parts, group by group.
@@ -64,7 +70,7 @@ impl<P: Part> Store<P> {
     /// Whose part a row is.
     #[inline(always)]
     pub fn owner(&self, row: usize) -> Owner {
-        self.groups[row / LANES].owners[row % LANES]
+        self.parts[part_of(&self.groups, row)].owner()
     }
 
     /// The rows of a block, a lane each.
@@ -94,6 +100,13 @@ impl<P: Part> Store<P> {
     pub fn column_bytes(&self) -> usize {
         self.blocks.capacity() * size_of::<Block<P::Rows>>() + self.groups.capacity() * size_of::<Group>()
     }
+}
+
+/// The part of a row, or the last one of its group where there is none.
+#[inline(always)]
+fn part_of(groups: &[Group], row: usize) -> usize {
+    let Group { first, count } = groups[row / LANES];
+    (first + (row % LANES) as u32).min(first + count - 1) as usize
 }
 
 /// Which sides of each row are seen; nothing is stored where all rows show both.

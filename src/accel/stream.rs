@@ -1,0 +1,228 @@
+//! Rays down the tree, each for itself: a lane is a child, in leaves a primitive.
+//!
+//! Rays of one octant go down as a list, so that a node is fetched once for all of them, and no ray waits for the
+//! answer of another: which boxes each of them meets is written down first, and the lists of the children follow
+//! from that without a branch.
+//!
+//! Source: Barringer and Akenine-Möller, "Dynamic ray stream traversal", ACM Transactions on Graphics 33(4), 2014.
+
+use super::leaf::LineLeaf;
+use super::line::Line;
+use super::node::{Child, Content, Node, near_planes};
+use super::stack::{Entry, Stack};
+use super::{Counts, Tree};
+use crate::lanes::{Float8, LANES, Mask8, RayPacket, bits, float8};
+use crate::shapes::RowRef;
+
+/// Rays that are to go down on their own, and room for it.
+#[derive(Debug, Default)]
+pub struct Stream {
+    /// Eight a packet.
+    lines: Vec<Line>,
+    octants: Vec<u8>,
+    /// By octant: rays that wait.
+    waiting: [Vec<u16>; 8],
+    room: Room,
+}
+
+/// Lists of the nodes on the way, one behind the other, and what waits.
+#[derive(Debug, Default)]
+struct Room {
+    rays: Vec<u16>,
+    /// By ray of a list: the slots that it meets, a bit each.
+    slots: Vec<u8>,
+    todo: Vec<Entry<Todo>>,
+}
+
+/// A child that some rays of a list meet.
+#[derive(Debug, Default, Clone, Copy)]
+struct Todo {
+    child: Child,
+    slot: u32,
+    first: u32,
+    count: u32,
+}
+
+impl Stream {
+    /// Most packets at a time.
+    pub const MOST: usize = 4096 / LANES;
+
+    /// Holds no rays.
+    pub fn clear(&mut self) {
+        self.lines.clear();
+        self.octants.clear();
+    }
+
+    /// How many packets there are.
+    pub fn packets(&self) -> usize {
+        self.lines.len() / LANES
+    }
+
+    /// Takes a packet, and tells its number.
+    #[inline(always)]
+    pub fn add(&mut self, rays: &RayPacket, hits: Float8) -> usize {
+        let (lines, octants) = Line::of_packet(rays, hits);
+        self.lines.extend(lines);
+        self.octants.extend(octants);
+        self.packets() - 1
+    }
+
+    /// Some rays of a packet are to go down next.
+    #[inline(always)]
+    pub fn wait(&mut self, packet: usize, lanes: u32) {
+        for lane in bits(lanes) {
+            let ray = packet * LANES + lane;
+            self.waiting[usize::from(self.octants[ray] % 8)].push(ray as u16);
+        }
+    }
+
+    /// Takes over what some rays of a packet have met since.
+    #[inline(always)]
+    pub fn refresh(&mut self, packet: usize, lanes: u32, rays: &RayPacket, hits: &Float8) {
+        let lines = &mut self.lines[packet * LANES..][..LANES];
+        let (t_max, hits) = (rays.t_max.as_array(), hits.as_array());
+        bits(lanes).for_each(|lane| lines[lane].set(t_max[lane], RowRef::from_lane(hits[lane])));
+    }
+
+    /// Hands back what some rays of a packet have met; with `ANY` those that met something are dead.
+    #[inline(always)]
+    pub fn hand_back<const ANY: bool>(&self, packet: usize, lanes: u32, rays: &mut RayPacket, hits: &mut Float8) {
+        let lines = &self.lines[packet * LANES..][..LANES];
+        let (t_min, t_max) = (rays.t_min.as_mut_array(), rays.t_max.as_mut_array());
+        let hits = hits.as_mut_array();
+        for lane in bits(lanes) {
+            t_max[lane] = lines[lane].t_max();
+            hits[lane] = lines[lane].hit().to_lane();
+            if ANY && lines[lane].hit() != RowRef::MISS {
+                t_min[lane] = f32::INFINITY;
+            }
+        }
+    }
+}
+
+impl Tree {
+    /// Takes the rays that wait down from some child on.
+    pub(super) fn descend_rays<const ANY: bool, const CULL: bool>(
+        &self,
+        from: Child,
+        stream: &mut Stream,
+        counts: &mut Counts,
+    ) {
+        let Stream { lines, waiting, room, .. } = stream;
+        for (octant, list) in waiting.iter_mut().enumerate().filter(|(_, list)| !list.is_empty()) {
+            room.fit(self.room, list.len());
+            if self.one_by_one {
+                for ray in list.iter() {
+                    room.rays[0] = *ray;
+                    self.descend_octant::<ANY, CULL>(from, octant, 1, lines, room, counts);
+                }
+            } else {
+                room.rays[..list.len()].copy_from_slice(list);
+                self.descend_octant::<ANY, CULL>(from, octant, list.len(), lines, room, counts);
+            }
+            list.clear();
+        }
+    }
+
+    /// Takes the first `count` rays of the room down.
+    fn descend_octant<const ANY: bool, const CULL: bool>(
+        &self,
+        from: Child,
+        octant: usize,
+        count: usize,
+        lines: &mut [Line],
+        room: &mut Room,
+        counts: &mut Counts,
+    ) {
+        let octant = Octant::new(octant);
+        let Room { rays, slots, todo } = room;
+        let mut todo = Stack::new(todo);
+        let mut next = Some(Todo { child: from, slot: 0, first: 0, count: count as u32 });
+        while let Some(Todo { child, first, count, .. }) = next {
+            let range = first as usize..(first + count) as usize;
+            let nearest = match child.content() {
+                Content::Leaf(leaf) => {
+                    let (stores, rays) = (&self.stores, &rays[range]);
+                    stores.visit(leaf.kind, LineLeaf::<ANY, CULL> { stores, leaf, rays, lines, counts });
+                    None
+                }
+                Content::Node(index) => {
+                    let node = &self.nodes[index];
+                    counts.boxes += u64::from(count) * LANES as u64;
+                    let (order, met) = octant.meets(node, &rays[range.clone()], &mut slots[range], lines);
+                    let child = |slot| Todo { child: node.child(slot), slot: slot as u32, first, count };
+                    todo.nearest_first::<ANY>(&order, met, child)
+                }
+            };
+            next = nearest.or_else(|| {
+                todo.pop_if(|entry, todo| {
+                    todo.count > 1 || entry <= lines[usize::from(rays[todo.first as usize])].reach()
+                })
+            });
+            if let Some(todo) = next.as_mut().filter(|todo| todo.count > 1) {
+                todo.pick(rays, slots);
+            }
+        }
+    }
+}
+
+impl Todo {
+    /// Moves on from the list of a node to the rays of it that meet the child.
+    #[inline(always)]
+    fn pick(&mut self, rays: &mut [u16], slots: &[u8]) {
+        let range = self.first as usize..(self.first + self.count) as usize;
+        let (list, picked) = rays.split_at_mut(range.end);
+        let mut count = 0;
+        for (ray, slots) in list[range.start..].iter().zip(&slots[range.clone()]) {
+            picked[count] = *ray;
+            count += usize::from(slots >> (self.slot & 7) & 1);
+        }
+        (self.first, self.count) = (range.end as u32, count as u32);
+    }
+}
+
+impl Room {
+    /// Room for so many rays, and what waits above them.
+    fn fit(&mut self, room: usize, rays: usize) {
+        let lists = (room / LANES + 2) * rays + 1;
+        if self.rays.len() < lists {
+            self.rays.resize(lists, 0);
+            self.slots.resize(lists, 0);
+        }
+        if self.todo.len() < room {
+            self.todo.resize(room, Entry::default());
+        }
+    }
+}
+
+/// Rays that go up and down on the same axes.
+struct Octant {
+    near: [usize; 3],
+    signs: [Float8; 3],
+}
+
+impl Octant {
+    fn new(octant: usize) -> Self {
+        let back = [0, 1, 2].map(|k| octant >> k & 1 == 1);
+        Octant { near: near_planes(back), signs: back.map(|back| float8(if back { -1.0 } else { 1.0 })) }
+    }
+
+    /// Which slots of a node each ray of a list meets, which any of them, and in what order they had better be
+    /// looked at: for one ray where it enters them.
+    #[inline(always)]
+    fn meets(&self, node: &Node, rays: &[u16], slots: &mut [u8], lines: &[Line]) -> (Float8, u32) {
+        let planes = [0, 1, 2].map(|k| node.planes(self.near[k]));
+        if let [ray] = rays {
+            let (entry, met) = lines[usize::from(*ray)].meets(&planes);
+            return (entry, met.bits());
+        }
+        let mut any = Mask8::NONE;
+        for (ray, slots) in rays.iter().zip(slots) {
+            let (_, met) = lines[usize::from(*ray)].meets(&planes);
+            *slots = met.bits() as u8;
+            any |= met;
+        }
+        let [x, y, z] = [0, 1, 2].map(|k| planes[k].0 * self.signs[k]);
+        (x + y + z, any.bits())
+    }
+}
