@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use common::*;
 use glam::{DVec2, DVec3};
 use octray::film::{Picture, Window};
+use octray::plan::{Skip, SkipSet};
 use octray::render::{Engine, RenderError};
 use octray::scene::*;
 use octray::{Progress, Renderer};
@@ -147,6 +148,39 @@ fn engines_and_skipping_change_nothing_at_any_number_of_samples() {
         assert_eq!(differing(&plain, &picture(&renderer.clone().skip(false))), [], "no skip, {spp}");
         let both = renderer.engine(Engine::Single).skip(false);
         assert_eq!(differing(&plain, &picture(&both)), [], "both, {spp}");
+    }
+}
+
+/// Each kind of work by itself, on a scene that needs most of it, and on scenes made so that it is left out.
+#[test]
+fn no_kind_of_work_left_out_changes_anything() {
+    let everything = everything();
+    let mut plain = everything.clone();
+    for object in &mut plain.objects {
+        object.material = [0, 5, 6][object.material % 3];
+    }
+    let mut mirrors = everything.clone();
+    mirrors.objects.iter_mut().for_each(|object| object.material = 2 + object.material % 2);
+    let mut dark = everything.clone();
+    dark.lights.push(point_light(DVec3::Y, 0.0));
+    let expected = [("bounces", &plain), ("shading", &plain), ("textures", &mirrors), ("lights", &mirrors)];
+    let expected = expected.into_iter().chain([("lights", &dark), ("shadows", &plain)]);
+    for (name, scene) in expected {
+        let skip = Skip::named(name).expect("a kind");
+        let renderer = Renderer::new(scene).expect("complete").threads(1);
+        let rendering = renderer.render(&()).expect("a picture");
+        let skipped = rendering.stats.skipped.iter().find(|skipped| skipped.what == name);
+        assert!(skipped.is_some_and(|skipped| skipped.count != Some(0)), "{name}: {:?}", rendering.stats.skipped);
+        let all = renderer.clone().skips(SkipSet::ALL.without(skip)).render(&()).expect("a picture");
+        assert!(all.stats.skipped.iter().all(|skipped| skipped.what != name));
+        for other in [all.picture, picture(&renderer.skip(false))] {
+            assert_eq!(differing(&rendering.picture, &other), [], "{name}");
+        }
+    }
+    let renderer = Renderer::new(&everything).expect("complete");
+    let all = picture(&renderer);
+    for skip in Skip::names().filter_map(Skip::named) {
+        assert_eq!(differing(&all, &picture(&renderer.clone().skips(SkipSet::ALL.without(skip)))), [], "{skip:?}");
     }
 }
 

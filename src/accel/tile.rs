@@ -85,6 +85,13 @@ impl Tile {
         self.common = common;
     }
 
+    /// Lanes of a packet that met something: a miss is the only reference whose bits are a NaN, as long as there
+    /// are fewer than 260 million turned boxes.
+    #[inline(always)]
+    pub fn met(&self, packet: usize) -> Mask8 {
+        Mask8::le(self.hits[packet], self.hits[packet])
+    }
+
     /// What lane `lane` of packet `packet` met.
     pub fn hit(&self, packet: usize, lane: usize) -> RowRef {
         RowRef::from_lane(self.hits[packet].as_array()[lane])

@@ -6,8 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use glam::DVec3;
-use octray::plan::InvalidScene;
-use octray::plan::Kind;
+use octray::plan::{InvalidScene, Kind, LeftOut};
 use octray::render::RenderError;
 use octray::scene::{
     Backdrop, Falloff, Filter, FilterKind, Frames, Integrator, Lens, Light, Material, Model, SCHEMA, Scene, Source,
@@ -90,7 +89,7 @@ fn info(path: &Path, scene: &Scene, load_seconds: f64) -> Result<Value, InvalidS
         "image": scene.image.as_ref().map(image),
         "render": render(scene),
         "warnings": scene.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
-        "skipped": [],
+        "skipped": tracer.plan().skips.report(&LeftOut::default()),
         "seconds": { "load": load_seconds, "build": build_seconds },
         "memory": {
             "peak_bytes": system::peak_bytes(),
@@ -281,6 +280,10 @@ fn page(info: &Value) -> String {
     }
     let render = &info["render"];
     line("render", format!("{}, depth {}, seed {}", word(&render["integrator"]), render["max_depth"], render["seed"]));
+    let skipped = info["skipped"].as_array().map_or(&[][..], Vec::as_slice);
+    for (i, skip) in skipped.iter().enumerate() {
+        line(if i == 0 { "skipped" } else { "" }, format!("{}: {}", word(&skip["what"]), word(&skip["why"])));
+    }
     let bytes = |name: &str| info["memory"][name].as_u64().map_or_else(|| "?".to_owned(), system::size);
     let (columns, tree) = (bytes("column_bytes"), bytes("tree_bytes"));
     line("memory", format!("columns {columns}, tree {tree}, {} in all while it was built", bytes("peak_bytes")));

@@ -4,8 +4,10 @@ use std::path::{Path, PathBuf};
 use std::time::{Instant, SystemTime};
 
 use clap::ValueEnum;
+use clap::builder::PossibleValuesParser;
 use octray::film::Window;
 use octray::output::{Description, description};
+use octray::plan::{Skip, SkipSet};
 use octray::render::{Engine, Stats};
 use octray::scene::{Frames, Integrator, particles};
 use octray::{Renderer, Rendering};
@@ -79,9 +81,10 @@ pub struct Args {
     seed: Option<u64>,
     #[command(flatten)]
     stats: StatsFile,
-    /// Do all the work, needed or not: the same picture to the bit
-    #[arg(long)]
-    no_skip: bool,
+    /// Do all the work, needed or not, or that of some kinds (as `octray info` names them): the same picture to the bit
+    #[arg(long, value_name = "NAME,...", num_args = 0..=1, require_equals = true, value_delimiter = ',',
+        default_missing_value = "all", value_parser = skip_names())]
+    no_skip: Vec<String>,
     #[command(flatten)]
     depth: Depth,
     /// Leave out of the file what differs from run to run (date, seconds, threads); so does SOURCE_DATE_EPOCH
@@ -197,7 +200,7 @@ impl Args {
 
     fn renderer<'s>(&self, scene: &'s octray::Scene) -> Result<Renderer<'s>, Failure> {
         let mut renderer =
-            Renderer::new(scene)?.threads(self.threads.count()).skip(!self.no_skip).engine(Engine::from(self.engine));
+            Renderer::new(scene)?.threads(self.threads.count()).skips(self.skips()).engine(Engine::from(self.engine));
         if let Some(name) = &self.camera {
             renderer = renderer.camera(name)?;
         }
@@ -214,6 +217,12 @@ impl Args {
             renderer = renderer.seed(seed);
         }
         Ok(renderer)
+    }
+
+    /// What may be left out.
+    fn skips(&self) -> SkipSet {
+        let without = |set: SkipSet, name: &String| Skip::named(name).map_or(SkipSet::NONE, |skip| set.without(skip));
+        self.no_skip.iter().fold(SkipSet::ALL, without)
     }
 
     fn description(&self, renderer: &Renderer, stats: &Stats, frame: i64) -> Description {
@@ -243,6 +252,11 @@ impl Args {
         stats_json::add_memory(&mut stats, work.column_bytes, work.tree_bytes);
         stats_json::write(path, stats, run)
     }
+}
+
+/// Kinds of work that may be left out, and all of them.
+fn skip_names() -> PossibleValuesParser {
+    PossibleValuesParser::new(std::iter::once("all").chain(Skip::names()))
 }
 
 /// The scene's name with another ending, in the directory that the command was called from.

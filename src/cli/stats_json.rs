@@ -59,7 +59,7 @@ pub fn add_render(stats: &mut Map<String, Value>, work: &Stats, is_reference: bo
     stats.insert("hits".to_owned(), Value::Object(hits));
     add_tests(stats, &work.tests);
     stats.insert("tiles".to_owned(), json!({ "total": work.tiles, "background": work.background_tiles }));
-    stats.insert("skipped".to_owned(), json!([]));
+    stats.insert("skipped".to_owned(), json!(work.skipped));
 }
 
 /// Tests done, in pairs. `box` counts boxes of tree nodes; the primitive of that name is `cuboid` here.

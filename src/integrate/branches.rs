@@ -1,38 +1,34 @@
 //! The rays that go on from hits.
 
-use glam::DVec3;
-
 use super::direct::Direct;
 use super::hits::{Exact, Shaded};
-use super::wave::{Branch, Wave, lanes};
+use super::wave::{Branch, Wave};
 use crate::lanes::Vec3x8;
+use crate::plan::Skip;
+
+/// Rays to be traced later: reflected, refracted.
+pub(super) type Later = [Vec<Branch>; 2];
 
 impl Direct<'_> {
-    /// The rays that go on: reflected, refracted.
-    pub(super) fn branches(&self, wave: &Wave, shaded: &[Shaded]) -> (Vec<Branch>, Vec<Branch>) {
-        let (mut reflected, mut refracted) = (Vec::new(), Vec::new());
-        for shaded in shaded {
-            let (p, Some(exact)) = (shaded.packet, &shaded.exact) else { continue };
-            let origins = [shaded.leave(false, shaded.error), shaded.leave(true, shaded.error)].map(Vec3x8::to_arrays);
-            let (colors, weights) = (shaded.bsdf.color.to_arrays(), wave.weight[p].to_arrays());
-            for i in lanes(shaded.hit) {
-                let color = DVec3::from_array(colors[i].map(f64::from));
-                let Exact { point, facing, material } = &exact[i];
-                let (mirrored, through) = self.materials.onward(*material).ways(color, facing);
-                let path = wave.paths[p][i].wrapping_mul(2);
-                for (list, way, path) in [(&mut reflected, mirrored, path), (&mut refracted, through, path + 1)] {
-                    let Some((dir, share)) = way else { continue };
-                    let share = share.as_vec3().to_array();
-                    let weight: [f32; 3] = std::array::from_fn(|k| share[k] * weights[i][k]);
-                    if self.skip && weight == [0.0; 3] {
-                        continue;
-                    }
-                    let origin = origins[usize::from(dir.dot(facing.n_g) > 0.0)][i];
-                    let slot = wave.slot(p, i) as u8;
-                    list.push(Branch { origin, exact: (*point, dir), weight, slot, path });
+    /// Adds the rays that go on from hits.
+    pub(super) fn branches(&self, wave: &Wave, shaded: &[Shaded], exact: &[Exact], later: &mut Later) {
+        let prune = self.plan.skips.allows(Skip::Bounces);
+        for Exact { packet, lane, point, facing, material } in exact {
+            let (p, i, shaded) = (*packet, *lane, &shaded[*packet]);
+            let color = Vec3x8::lane(&shaded.bsdf.color, i).map(f64::from).into();
+            let ways = self.materials.onward(*material).ways(color, facing);
+            let (weight, path) = (wave.weight(p, i), wave.path(p, i).wrapping_mul(2));
+            for (list, way) in [ways.0, ways.1].into_iter().enumerate() {
+                let Some((dir, share)) = way else { continue };
+                let share = share.as_vec3().to_array();
+                let weight: [f32; 3] = std::array::from_fn(|k| share[k] * weight[k]);
+                if prune && weight == [0.0; 3] {
+                    continue;
                 }
+                let origin = shaded.leave(dir.dot(facing.n_g) > 0.0, shaded.error).lane(i);
+                let path = path + list as u32;
+                later[list].push(Branch { origin, exact: (*point, dir), weight, slot: wave.slot(p, i) as u32, path });
             }
         }
-        (reflected, refracted)
     }
 }

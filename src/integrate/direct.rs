@@ -3,14 +3,16 @@
 //! Source: Whitted, "An improved illumination model for shaded display", Communications of the ACM
 //! 23(6), 1980; what each material and light does is said in [`scene`](crate::scene).
 
-use super::hits::Shaded;
+use std::slice::from_mut;
+
+use super::branches::Later;
+use super::hits::{Exact, Shaded};
 use super::record::{RayCounts, RayKind, Record};
-use super::wave::{Branch, Wave, lanes};
+use super::wave::{WAVE, Wave};
 use crate::accel::{PACKETS, Tile, Tree, Walk};
-use crate::lanes::{Float8, LANES, Mask8, Vec3x8, float8};
-use crate::plan::Plan;
+use crate::lanes::{Float8, LANES, Mask8, Vec3x8, bits, float8};
+use crate::plan::{LeftOut, Plan, Skip};
 use crate::shade::{Backdrop8, LightTable, MaterialTable};
-use crate::shapes::RowRef;
 
 /// All that is needed to find the radiance along rays.
 #[derive(Debug)]
@@ -20,175 +22,213 @@ pub struct Direct<'s> {
     pub(super) materials: MaterialTable,
     pub(super) lights: LightTable,
     backdrop: Backdrop8<'s>,
-    ambient: Vec3x8,
+    ambient: Option<Vec3x8>,
     max_depth: u32,
-    /// Leaves out rays that cannot change the picture.
-    pub(super) skip: bool,
 }
 
-/// Radiance and alpha of the samples of one tile.
-#[derive(Debug, Clone)]
+/// Radiance and alpha of samples, by packet.
+#[derive(Debug, Default)]
 pub struct Samples {
-    /// Linear Rec. 709 by packet.
-    pub radiance: [Vec3x8; PACKETS],
+    /// Linear Rec. 709.
+    pub radiance: Vec<Vec3x8>,
     /// 1 where a surface or the backdrop is seen.
-    pub alpha: [Float8; PACKETS],
+    pub alpha: Vec<Float8>,
 }
 
 /// Room for work, and its counts: one a thread.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Room {
     /// Tests done.
     pub walk: Walk,
     /// Rays traced.
     pub rays: RayCounts,
-    /// Tiles that are done with; boxed, since they go from hand to hand and are large.
-    #[allow(clippy::vec_box)] // or each would be copied in and out
-    pub(super) tiles: Vec<Box<Tile>>,
-    /// Hits that are being shaded.
+    /// Work left out.
+    pub left_out: LeftOut,
+    /// The rays that are traced next: the caller sets the packets of camera rays.
+    pub wave: Box<Wave>,
+    /// What became of the samples since [`Room::begin`].
+    pub samples: Samples,
+    shadows: Box<Tile>,
     shaded: Vec<Shaded>,
+    exact: Vec<Exact>,
+    later: Later,
 }
 
-impl Room {
-    /// A tile whose packets are to be set.
-    pub fn tile(&mut self, common: Option<[f32; 3]>) -> Box<Tile> {
-        let mut tile = self.tiles.pop().unwrap_or_else(|| Box::new(Tile::empty()));
-        tile.renew(common);
-        tile
-    }
-}
-
-/// Where the work on one tile goes.
+/// Where the light on a wave goes, and what that takes.
 pub(super) struct Sink<'a, R: Record> {
-    pub samples: &'a mut Samples,
-    pub room: &'a mut Room,
+    /// Along the rays of the wave.
+    pub radiance: &'a mut [Vec3x8; PACKETS],
+    pub shadows: &'a mut Tile,
+    pub walk: &'a mut Walk,
+    pub rays: &'a mut RayCounts,
+    pub left_out: &'a mut LeftOut,
     pub record: &'a mut R,
 }
 
-/// Up to 64 rays that are traced later.
-struct Later {
-    branches: Vec<Branch>,
-    kind: RayKind,
-    depth: u32,
+impl Default for Room {
+    fn default() -> Self {
+        Room {
+            walk: Walk::default(),
+            rays: RayCounts::default(),
+            left_out: LeftOut::default(),
+            wave: Box::new(Wave::empty()),
+            samples: Samples::default(),
+            shadows: Box::new(Tile::empty()),
+            shaded: vec![Shaded::NOTHING; PACKETS],
+            exact: Vec::new(),
+            later: Later::default(),
+        }
+    }
+}
+
+impl Room {
+    /// Begins with new samples.
+    pub fn begin(&mut self) {
+        self.samples.radiance.clear();
+        self.samples.alpha.clear();
+    }
+
+    /// The wave for the next 64 camera rays.
+    pub fn camera_wave(&mut self, common: Option<[f32; 3]>) -> &mut Wave {
+        let first = self.samples.radiance.len();
+        self.samples.radiance.resize(first + PACKETS, Vec3x8::ZERO);
+        self.samples.alpha.resize(first + PACKETS, Float8::ZERO);
+        self.wave.begin(first * LANES, common);
+        &mut self.wave
+    }
 }
 
 impl<'s> Direct<'s> {
     /// Makes tables of the plan's materials and lights.
-    pub fn new(plan: &'s Plan<'s>, tree: &'s Tree, max_depth: u32, skip: bool) -> Self {
+    pub fn new(plan: &'s Plan<'s>, tree: &'s Tree, max_depth: u32) -> Self {
+        let ambient = plan.scene.ambient.as_vec3().to_array();
+        let is_needed = ambient != [0.0; 3] || !plan.skips.allows(Skip::Shading);
         Direct {
             plan,
             tree,
             materials: MaterialTable::new(plan.scene),
             lights: LightTable::new(plan),
             backdrop: Backdrop8::new(&plan.scene.background.backdrop),
-            ambient: Vec3x8::splat(plan.scene.ambient.as_vec3().to_array()),
+            ambient: is_needed.then(|| Vec3x8::splat(ambient)),
             max_depth,
-            skip,
         }
     }
 
-    /// Whether rays go on from some material, so that rays are to be given in f64 as well.
-    pub fn scatters(&self) -> bool {
-        self.plan.scatters
+    /// Whether rays are to be given in f64 as well, since rays may go on from what they meet.
+    pub fn goes_on(&self) -> bool {
+        self.plan.scatters || !self.plan.skips.allows(Skip::Bounces)
     }
 
-    /// Radiance along camera rays, which where [`Direct::scatters`] keep what they were before they were
-    /// rounded. What goes on from them waits on a list, not on the stack: chains may be long.
-    pub fn radiance<R: Record>(&self, wave: Wave, room: &mut Room, record: &mut R) -> Samples {
-        let mut samples = Samples { radiance: [Vec3x8::ZERO; PACKETS], alpha: [Float8::ZERO; PACKETS] };
-        let mut sink = Sink { samples: &mut samples, room, record };
-        let mut waiting = Vec::new();
-        self.trace(wave, &mut sink, &mut waiting);
-        while let Some(Later { branches, kind, depth }) = waiting.pop() {
-            let tile = sink.room.tile(None);
-            self.trace(Wave::of_branches(tile, &branches, kind, depth), &mut sink, &mut waiting);
-        }
-        samples
+    /// Traces the camera rays of the wave, which where [`Direct::goes_on`] keep what they were before they were
+    /// rounded. What goes on from them waits for [`Direct::trace_later`].
+    pub fn trace_camera<R: Record>(&self, room: &mut Room, record: &mut R) {
+        self.trace(room, record);
     }
 
-    fn trace<R: Record>(&self, mut wave: Wave, sink: &mut Sink<R>, waiting: &mut Vec<Later>) {
-        let live: [u32; PACKETS] = std::array::from_fn(|p| wave.tile.packets[p].live().bits());
-        let redecided = sink.room.walk.counts.redecided;
-        self.tree.closest_tiles(std::slice::from_mut(&mut wave.tile), &mut sink.room.walk);
-        sink.room.rays.redecided[wave.kind as usize] += sink.room.walk.counts.redecided - redecided;
-        let mut shaded = std::mem::take(&mut sink.room.shaded);
-        for (p, live) in live.into_iter().enumerate().filter(|(_, live)| *live != 0) {
-            let hit = lanes(live).filter(|i| wave.tile.hit(p, *i) != RowRef::MISS).map(|i| 1 << i).sum::<u32>();
-            sink.room.rays.rays[wave.kind as usize] += u64::from(live.count_ones());
-            sink.room.rays.hits[wave.kind as usize] += u64::from(hit.count_ones());
-            if R::ON {
-                self.tell(&wave, p, live, sink.record);
-            }
-            self.add_background(&wave, p, live & !hit, sink.samples);
-            if hit != 0 {
-                shaded.push(self.shade(&wave, p, hit, sink.record));
-            }
-        }
-        self.add_ambient(&wave, &shaded, sink.samples);
-        for light in self.lights.iter().enumerate() {
-            self.add_light(light, &wave, &shaded, sink);
-        }
-        if wave.depth < self.max_depth && self.plan.scatters {
-            let (reflected, refracted) = self.branches(&wave, &shaded);
-            // The last one in is the first one out.
-            for (kind, branches) in [(RayKind::Refraction, refracted), (RayKind::Reflection, reflected)] {
-                if !branches.is_empty() {
-                    waiting.push(Later { branches, kind, depth: wave.depth + 1 });
+    /// Traces what goes on from the camera rays since [`Room::begin`], depth by depth, so that few of the tiles are
+    /// not full. All rays of a sample keep their order, whatever other samples are there: so sums do as well.
+    pub fn trace_later<R: Record>(&self, room: &mut Room, record: &mut R) {
+        for depth in 2..=self.max_depth {
+            let later = std::mem::take(&mut room.later);
+            for (kind, branches) in [RayKind::Reflection, RayKind::Refraction].into_iter().zip(later) {
+                for branches in branches.chunks(WAVE) {
+                    room.wave.fill(branches, kind, depth);
+                    self.trace(room, record);
                 }
             }
+            if room.later.iter().all(Vec::is_empty) {
+                break;
+            }
         }
-        shaded.clear();
-        sink.room.shaded = shaded;
-        sink.room.tiles.push(wave.tile);
+        room.later.iter_mut().for_each(Vec::clear);
+    }
+
+    fn trace<R: Record>(&self, room: &mut Room, record: &mut R) {
+        let Room { walk, rays, left_out, wave, samples, shadows, shaded, exact, later } = room;
+        let kind = wave.kind as usize;
+        let live: [u32; PACKETS] = std::array::from_fn(|p| wave.tile.packets[p].live().bits());
+        let redecided = walk.counts.redecided;
+        self.tree.closest_tiles(from_mut(&mut wave.tile), walk);
+        rays.redecided[kind] += walk.counts.redecided - redecided;
+        let wave = &**wave;
+        let mut radiance = [Vec3x8::ZERO; PACKETS];
+        let mut seen = 0;
+        exact.clear();
+        for (p, live) in live.into_iter().enumerate().filter(|(_, live)| *live != 0) {
+            let hit = live & wave.tile.met(p).bits();
+            rays.rays[kind] += u64::from(live.count_ones());
+            rays.hits[kind] += u64::from(hit.count_ones());
+            if R::ON {
+                self.tell(wave, p, live, record);
+            }
+            self.add_background(wave, p, live & !hit, &mut radiance[p], samples);
+            if hit != 0 {
+                seen |= 1 << p;
+                self.shade(wave, (p, hit), &mut shaded[p], exact, record);
+                self.add_ambient(wave, &shaded[p], &mut radiance[p]);
+            }
+        }
+        let sink = &mut Sink { radiance: &mut radiance, shadows, walk, rays, left_out, record };
+        for light in self.lights.iter() {
+            self.add_light(light, wave, (shaded, seen), sink);
+        }
+        samples.add(wave, &live, &radiance);
+        if wave.depth < self.max_depth && self.goes_on() {
+            self.branches(wave, shaded, exact, later);
+        }
     }
 
     fn tell<R: Record>(&self, wave: &Wave, p: usize, live: u32, record: &mut R) {
         let t = wave.tile.packets[p].t_max.to_array();
-        for i in lanes(live) {
+        for i in bits(live) {
             let row = wave.tile.hit(p, i);
             let met = row.kind().map(|kind| self.tree.stores().owner(kind, row.row()).primitive);
-            record.ray(wave.kind, wave.ray(p, i, f32::INFINITY), met, t[i], wave.slot(p, i), wave.paths[p][i]);
+            record.ray(wave.kind, wave.ray(p, i, f32::INFINITY), met, t[i], wave.slot(p, i), wave.path(p, i));
         }
     }
 
-    fn add_background(&self, wave: &Wave, p: usize, miss: u32, samples: &mut Samples) {
+    #[inline(always)]
+    fn add_background(&self, wave: &Wave, p: usize, miss: u32, radiance: &mut Vec3x8, samples: &mut Samples) {
         let camera = wave.kind == RayKind::Camera;
         let transparent = camera && self.plan.scene.background.transparent;
         if camera {
             let opaque = if transparent { !miss } else { !0 };
-            samples.alpha[p] = Mask8::from_bits(opaque & 0xff).select(float8(1.0), Float8::ZERO);
+            let alpha = Mask8::from_bits(opaque & 0xff).select(float8(1.0), Float8::ZERO);
+            samples.alpha[wave.first / LANES + p] = alpha;
         }
         if miss != 0 && !transparent {
-            let radiance = self.backdrop.radiance(wave.tile.packets[p].dir, miss);
-            samples.add(wave, p, radiance.scale(wave.weight[p]), miss);
+            let seen = wave.weighted(p, self.backdrop.radiance(wave.tile.packets[p].dir, miss));
+            *radiance = Vec3x8::select(Mask8::from_bits(miss), seen, Vec3x8::ZERO);
         }
     }
 
-    fn add_ambient(&self, wave: &Wave, shaded: &[Shaded], samples: &mut Samples) {
-        for shaded in shaded {
-            let p = shaded.packet;
+    #[inline(always)]
+    fn add_ambient(&self, wave: &Wave, shaded: &Shaded, radiance: &mut Vec3x8) {
+        if let Some(ambient) = self.ambient {
             let albedo = shaded.bsdf.color * shaded.bsdf.diffuse;
-            samples.add(wave, p, albedo.scale(self.ambient).scale(wave.weight[p]), shaded.hit);
+            let seen = wave.weighted(shaded.packet, albedo.scale(ambient));
+            *radiance = Vec3x8::select(Mask8::from_bits(shaded.hit), *radiance + seen, *radiance);
         }
     }
 }
 
 impl Samples {
-    /// Adds radiance to the samples of some lanes.
-    #[inline(always)]
-    pub(super) fn add(&mut self, wave: &Wave, p: usize, radiance: Vec3x8, mask: u32) {
-        if wave.slots.is_none() {
-            let radiance = Vec3x8::select(Mask8::from_bits(mask), radiance, Vec3x8::ZERO);
-            self.radiance[p] = self.radiance[p] + radiance;
+    /// Adds what was found along the rays of a wave; camera rays are the first of their samples.
+    fn add(&mut self, wave: &Wave, live: &[u32; PACKETS], radiance: &[Vec3x8; PACKETS]) {
+        if wave.kind == RayKind::Camera {
+            let first = wave.first / LANES;
+            self.radiance[first..first + PACKETS].copy_from_slice(radiance);
             return;
         }
-        let values = radiance.to_arrays();
-        for i in lanes(mask) {
-            let slot = wave.slot(p, i);
-            let sums = &mut self.radiance[slot / LANES];
-            sums.x.as_mut_array()[slot % LANES] += values[i][0];
-            sums.y.as_mut_array()[slot % LANES] += values[i][1];
-            sums.z.as_mut_array()[slot % LANES] += values[i][2];
+        for (p, live) in live.iter().enumerate().filter(|(_, live)| **live != 0) {
+            let values = radiance[p].to_arrays();
+            for i in bits(*live) {
+                let slot = wave.slot(p, i);
+                let sums = &mut self.radiance[slot / LANES];
+                sums.x.as_mut_array()[slot % LANES] += values[i][0];
+                sums.y.as_mut_array()[slot % LANES] += values[i][1];
+                sums.z.as_mut_array()[slot % LANES] += values[i][2];
+            }
         }
     }
 }

@@ -1,11 +1,14 @@
 //! Lights on hits, one light and one wave at a time, and their shadow rays.
 
+use std::slice::from_mut;
+
 use super::direct::{Direct, Sink};
 use super::hits::Shaded;
 use super::record::{RayKind, Record};
-use super::wave::{Wave, lanes};
+use super::wave::Wave;
 use crate::accel::PACKETS;
-use crate::lanes::{Float8, Mask8, RayPacket, UNIT_ROUNDOFF, Vec3x8, float8};
+use crate::lanes::{Float8, Mask8, RayPacket, UNIT_ROUNDOFF, Vec3x8, bits, float8};
+use crate::plan::Skip;
 use crate::shade::{Illumination, Toward};
 
 /// What one light gives to the hits of a wave.
@@ -13,42 +16,57 @@ struct Shares {
     radiance: [Vec3x8; PACKETS],
     /// Lanes that it shines on, by packet.
     lit: [u32; PACKETS],
+    /// Lanes whose shadow rays are traced, by packet.
+    cast: [u32; PACKETS],
 }
 
+/// Hits by packet, and the packets that have any.
+type Hits<'a> = (&'a [Shaded], u32);
+
 impl Direct<'_> {
-    /// Adds one light, by its index, to the samples of a wave.
+    /// Adds one light, by its index, to the radiance along a wave.
     pub(super) fn add_light<R: Record>(
         &self,
-        (index, light): (usize, &Illumination),
+        (index, light): &(usize, Illumination),
         wave: &Wave,
-        shaded: &[Shaded],
+        hits: Hits,
         sink: &mut Sink<R>,
     ) {
-        let mut shares = self.shares(light, wave, shaded);
+        let mut shares = self.shares(light, wave, hits, sink);
         if light.shadows {
-            self.cast_shadows((index, light), wave, shaded, &mut shares.lit, sink);
+            self.cast_shadows((*index, light), wave, hits, &mut shares, sink);
         } else if R::ON {
             for (p, lit) in shares.lit.into_iter().enumerate() {
-                lanes(lit).for_each(|i| sink.record.lit(index, wave.slot(p, i), wave.paths[p][i]));
+                bits(lit).for_each(|i| sink.record.lit(*index, wave.slot(p, i), wave.path(p, i)));
             }
         }
-        for (p, radiance) in shares.radiance.into_iter().enumerate() {
-            if shares.lit[p] != 0 {
-                sink.samples.add(wave, p, radiance, shares.lit[p]);
-            }
+        for p in bits(hits.1) {
+            let sum = sink.radiance[p] + shares.radiance[p];
+            sink.radiance[p] = Vec3x8::select(Mask8::from_bits(shares.lit[p]), sum, sink.radiance[p]);
         }
     }
 
-    fn shares(&self, light: &Illumination, wave: &Wave, shaded: &[Shaded]) -> Shares {
-        let mut shares = Shares { radiance: [Vec3x8::ZERO; PACKETS], lit: [0; PACKETS] };
-        for shaded in shaded {
-            let p = shaded.packet;
+    #[inline(always)]
+    fn shares<R: Record>(&self, light: &Illumination, wave: &Wave, hits: Hits, sink: &mut Sink<R>) -> Shares {
+        let mut shares = Shares { radiance: [Vec3x8::ZERO; PACKETS], lit: [0; PACKETS], cast: [0; PACKETS] };
+        let skip = self.plan.skips.allows(Skip::Shadows);
+        for p in bits(hits.1) {
+            let shaded = &hits.0[p];
             let (wi, strength) = light.sample(shaded.point);
             let (share, facing) = shaded.share(wi, strength);
-            let share = share.scale(wave.weight[p]);
-            let gives = Mask8::gt(share.x + share.y + share.z, Float8::ZERO);
-            let lit = if self.skip { facing & gives } else { facing };
+            let share = wave.weighted(p, share);
+            let gives = Mask8::gt(share.sum(), Float8::ZERO);
+            let lit = if skip { facing & gives } else { facing };
             (shares.radiance[p], shares.lit[p]) = (share, lit.bits() & shaded.hit);
+            shares.cast[p] = match (light.shadows, skip) {
+                (false, _) => 0,
+                (true, true) => shares.lit[p],
+                // All but those in the light itself, where there is no way to go.
+                (true, false) => Mask8::le(wi.x, wi.x).bits() & shaded.hit,
+            };
+            if light.shadows {
+                sink.left_out[Skip::Shadows] += u64::from((shaded.hit & !shares.cast[p]).count_ones());
+            }
         }
         shares
     }
@@ -58,40 +76,41 @@ impl Direct<'_> {
         &self,
         (index, light): (usize, &Illumination),
         wave: &Wave,
-        shaded: &[Shaded],
-        lit: &mut [u32; PACKETS],
+        hits: Hits,
+        shares: &mut Shares,
         sink: &mut Sink<R>,
     ) {
-        let common = match light.toward {
+        if shares.cast == [0; PACKETS] {
+            return;
+        }
+        let tile = &mut *sink.shadows;
+        tile.renew(match light.toward {
             Toward::Point(position) => Some(position),
             Toward::Direction(_) => None,
-        };
-        let mut tile = sink.room.tile(common);
-        let mut rest = shaded.iter().peekable();
+        });
         for (p, packet) in tile.packets.iter_mut().enumerate() {
-            *packet = match rest.next_if(|shaded| shaded.packet == p) {
-                Some(shaded) if lit[p] != 0 => shaded.shadow_rays(light, Mask8::from_bits(lit[p])),
-                _ => RayPacket::dead(),
+            *packet = match shares.cast[p] {
+                0 => RayPacket::dead(),
+                cast => hits.0[p].shadow_rays(light, Mask8::from_bits(cast)),
             };
         }
         let told = R::ON.then_some(tile.packets);
-        let redecided = sink.room.walk.counts.redecided;
-        self.tree.occluded_tiles(std::slice::from_mut(&mut tile), &mut sink.room.walk);
-        let counts = &mut sink.room.rays;
-        counts.redecided[RayKind::Shadow as usize] += sink.room.walk.counts.redecided - redecided;
-        for (p, lit) in lit.iter_mut().enumerate() {
-            let bright = *lit & tile.packets[p].live().bits();
-            counts.rays[RayKind::Shadow as usize] += u64::from(lit.count_ones());
-            counts.hits[RayKind::Shadow as usize] += u64::from((*lit & !bright).count_ones());
+        let redecided = sink.walk.counts.redecided;
+        self.tree.occluded_tiles(from_mut(tile), sink.walk);
+        sink.rays.redecided[RayKind::Shadow as usize] += sink.walk.counts.redecided - redecided;
+        for p in bits(hits.1) {
+            let (cast, lit) = (shares.cast[p], &mut shares.lit[p]);
+            let bright = cast & tile.packets[p].live().bits();
+            sink.rays.rays[RayKind::Shadow as usize] += u64::from(cast.count_ones());
+            sink.rays.hits[RayKind::Shadow as usize] += u64::from((cast & !bright).count_ones());
             if let Some(packets) = &told {
-                for i in lanes(*lit) {
+                for i in bits(*lit) {
                     let dark = bright >> i & 1 == 0;
-                    sink.record.shadow(index, packets[p].lane(i), dark, wave.slot(p, i), wave.paths[p][i]);
+                    sink.record.shadow(index, packets[p].lane(i), dark, wave.slot(p, i), wave.path(p, i));
                 }
             }
-            *lit = bright;
+            *lit &= bright;
         }
-        sink.room.tiles.push(tile);
     }
 }
 

@@ -11,4 +11,4 @@ mod wave;
 pub use self::camera::{CameraRays, PixelPattern, Samples8};
 pub use self::direct::{Direct, Room, Samples};
 pub use self::record::{RayCounts, RayKind, Record, Silent};
-pub use self::wave::{ExactRays, Wave};
+pub use self::wave::{WAVE, Wave};

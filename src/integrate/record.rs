@@ -53,12 +53,12 @@ impl RayCounts {
 }
 
 /// Looks on while rays are traced. A path is 1 for the camera ray, 2p for the ray reflected and 2p + 1 for
-/// the one refracted where path p ended; a slot is the sample's place in its tile.
+/// the one refracted where path p ended; a slot is the sample's place in its batch.
 pub trait Record {
     /// Whether anything is to be told: what only the record needs is left out otherwise.
     const ON: bool;
-    /// A tile of camera rays begins: pixel and sample index by slot.
-    fn tile(&mut self, samples: &mut dyn Iterator<Item = (i32, i32, u32)>);
+    /// A tile of camera rays begins: pixel and sample index of the slots from `first` on; 0 begins a batch.
+    fn tile(&mut self, first: usize, samples: &mut dyn Iterator<Item = (i32, i32, u32)>);
     /// A ray met a primitive, or nothing; `ray` holds the very bits that were traced, `t` where it was met.
     fn ray(&mut self, kind: RayKind, ray: Ray, met: Option<u32>, t: f32, slot: usize, path: u32);
     /// A surface at the end of a path was lit by a light, or lay in shadow.
@@ -75,7 +75,7 @@ pub struct Silent;
 
 impl Record for Silent {
     const ON: bool = false;
-    fn tile(&mut self, _: &mut dyn Iterator<Item = (i32, i32, u32)>) {}
+    fn tile(&mut self, _: usize, _: &mut dyn Iterator<Item = (i32, i32, u32)>) {}
     fn ray(&mut self, _: RayKind, _: Ray, _: Option<u32>, _: f32, _: usize, _: u32) {}
     fn shadow(&mut self, _: usize, _: Ray, _: bool, _: usize, _: u32) {}
     fn lit(&mut self, _: usize, _: usize, _: u32) {}

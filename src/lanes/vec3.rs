@@ -45,6 +45,14 @@ impl Vec3x8 {
         [self.x.to_array()[i], self.y.to_array()[i], self.z.to_array()[i]]
     }
 
+    /// Sets the vector of one lane.
+    #[inline(always)]
+    pub fn set_lane(&mut self, i: usize, [x, y, z]: [f32; 3]) {
+        self.x.as_mut_array()[i] = x;
+        self.y.as_mut_array()[i] = y;
+        self.z.as_mut_array()[i] = z;
+    }
+
     /// All lanes as vectors.
     #[inline(always)]
     pub fn to_arrays(self) -> [[f32; 3]; LANES] {

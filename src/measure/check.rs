@@ -299,8 +299,9 @@ impl Tape {
 impl Record for Tape {
     const ON: bool = true;
 
-    fn tile(&mut self, samples: &mut dyn Iterator<Item = (i32, i32, u32)>) {
-        self.slots = samples.collect();
+    fn tile(&mut self, first: usize, samples: &mut dyn Iterator<Item = (i32, i32, u32)>) {
+        self.slots.truncate(first);
+        self.slots.extend(samples);
     }
 
     fn ray(&mut self, kind: RayKind, ray: Ray, met: Option<u32>, t: f32, slot: usize, path: u32) {

@@ -1,18 +1,22 @@
 //! What a render needs of a scene, decided once: the parts that kernels know, relative to an origin,
 //! and what can be left out.
 
+mod needs;
 mod parts;
+mod skips;
 mod split;
 mod valid;
 
 use glam::DVec3;
 
+pub use self::skips::{LeftOut, Skip, SkipSet, Skipped, Skips};
 pub use self::valid::{InvalidScene, validate};
 
+use self::needs::Needs;
 pub use self::parts::{
     BoxPart, ConePart, CylinderPart, DiskPart, Kind, Owner, Parts, PlanePart, PolygonPart, SpherePart, TurnedBoxPart,
 };
-use crate::scene::{CloudMaterial, Material, Object, Scene, Shape, Visible};
+use crate::scene::{Material, Scene, Visible};
 
 /// Decisions about one scene seen from one origin.
 #[derive(Debug)]
@@ -30,39 +34,42 @@ pub struct Plan<'s> {
     pub colored: bool,
     /// Some polygon has normals.
     pub smooth: bool,
-    /// Rays go on from some material: hits are found again in f64, since curved mirrors multiply rounding.
+    /// Some material in use has a texture.
+    pub textured: bool,
+    /// Some material in use has a highlight.
+    pub shines: bool,
+    /// Rays go on from some material in use.
     pub scatters: bool,
-}
-
-/// Materials that some primitive shows, their backs among them.
-fn used_materials(scene: &Scene) -> Vec<usize> {
-    let mut used = vec![false; scene.materials.len()];
-    scene.objects.iter().for_each(|object| used[object.material] = true);
-    for cloud in &scene.clouds {
-        match &cloud.material {
-            CloudMaterial::One(material) => used[*material] = true,
-            CloudMaterial::Each(materials) => materials.iter().for_each(|material| used[*material as usize] = true),
-        }
-    }
-    let backs: Vec<usize> = (0..used.len()).filter(|i| used[*i]).filter_map(|i| scene.materials[i].back).collect();
-    backs.into_iter().for_each(|back| used[back] = true);
-    (0..used.len()).filter(|i| used[*i]).collect()
+    /// By material: whether rays go on from either side of it. Such hits are found again in f64, since curved
+    /// mirrors multiply rounding.
+    pub goes_on: Vec<bool>,
+    /// By light: whether it is to be asked at all.
+    pub lights: Vec<bool>,
+    /// What is left out, and why.
+    pub skips: Skips,
 }
 
 impl<'s> Plan<'s> {
-    /// Plans for rays that are given relative to `origin`.
+    /// Plans for rays that are given relative to `origin`; all that is not needed is left out.
     pub fn new(scene: &'s Scene, origin: DVec3) -> Self {
+        Plan::leaving_out(SkipSet::ALL, scene, origin)
+    }
+
+    /// The same where only some kinds of work may be left out.
+    pub fn leaving_out(allowed: SkipSet, scene: &'s Scene, origin: DVec3) -> Self {
         let visible = scene.materials.iter().map(|material: &Material| material.visible).collect();
-        let colored = scene.clouds.iter().any(|cloud| cloud.colors.is_some());
-        let has_normals = |object: &Object| match &object.shape {
-            Shape::Polygon(polygon) => !polygon.normals.is_empty(),
-            _ => false,
-        };
-        let smooth = scene.objects.iter().any(has_normals);
-        let scatters = used_materials(scene).iter().any(|index| scene.materials[*index].model.scatters());
         let side = |(front, material): (usize, &Material)| [material.back.unwrap_or(front) as u32, front as u32];
-        let sides = scene.materials.iter().enumerate().map(side).collect();
-        Plan { scene, origin, visible, sides, colored, smooth, scatters }
+        let sides: Vec<[u32; 2]> = scene.materials.iter().enumerate().map(side).collect();
+        let needs = Needs::of(scene);
+        let mut skips = Skips::new(allowed);
+        needs.decide(scene, &mut skips);
+        let lights = needs.lights.iter().map(|needed| *needed || !skips.allows(Skip::Lights)).collect();
+        let goes_on =
+            |side: &[u32; 2]| side.iter().any(|material| scene.materials[*material as usize].model.scatters());
+        let goes_on = sides.iter().map(goes_on).collect();
+        let textured = needs.textures.contains(&true);
+        let Needs { colored, smooth, shines, scatters, .. } = needs;
+        Plan { scene, origin, visible, sides, colored, smooth, textured, shines, scatters, goes_on, lights, skips }
     }
 
     /// All parts of the scene, relative to the origin.
@@ -74,5 +81,12 @@ impl<'s> Plan<'s> {
     #[inline(always)]
     pub fn side_material(&self, material: u32, front: bool) -> u32 {
         self.sides[material as usize][usize::from(front)]
+    }
+
+    /// Whether both sides of a material are the same.
+    #[inline(always)]
+    pub fn is_same_on_both_sides(&self, material: u32) -> bool {
+        let [back, front] = self.sides[material as usize];
+        back == front
     }
 }

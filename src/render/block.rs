@@ -2,10 +2,13 @@
 
 use std::ops::Range;
 
-use crate::accel::PACKETS;
+use crate::accel::{Counts, PACKETS};
 use crate::film::{Picture, Window};
-use crate::integrate::{CameraRays, Direct, PixelPattern, RayKind, Record, Room, Samples, Samples8, Wave};
+use crate::integrate::{
+    CameraRays, Direct, PixelPattern, RayCounts, RayKind, Record, Room, Samples, Samples8, WAVE, Wave,
+};
 use crate::lanes::LANES;
+use crate::plan::LeftOut;
 
 /// Pixels along an edge.
 const EDGE: i32 = 32;
@@ -21,10 +24,15 @@ pub struct Block {
 pub struct BlockWork {
     /// Row by row.
     pub pixels: Vec<[f32; 4]>,
-    pub room: Room,
+    pub rays: RayCounts,
+    pub tests: Counts,
+    pub left_out: LeftOut,
     pub tiles: u64,
     pub background_tiles: u64,
 }
+
+/// Camera tiles that are traced before what goes on from them, so that the tiles of that are full.
+const BATCH: usize = 32;
 
 impl Block {
     pub fn new(window: Window) -> Self {
@@ -48,39 +56,28 @@ impl Block {
     /// So a tile is as square as the number of samples allows, and each pixel sums in sample order.
     pub fn trace<R: Record>(&self, rays: &CameraRays, direct: &Direct, spp: u32, record: &mut R) -> BlockWork {
         let window = self.window;
-        let mut room = Room::default();
-        let mut sums = vec![[0f64; 4]; window.area()];
-        let (mut tiles, mut background_tiles) = (0, 0);
-        let mut pending = Pending::default();
-        let mut flush = |pending: &mut Pending, room: &mut Room| {
-            if R::ON {
-                record.tile(&mut pending.samples());
-            }
-            let met = room.rays.hits[RayKind::Camera as usize];
-            let samples = direct.radiance(pending.wave(rays, direct.scatters(), room), room, record);
-            pending.add_to(&samples, &mut sums);
-            tiles += 1;
-            background_tiles += u64::from(room.rays.hits[RayKind::Camera as usize] == met);
-            pending.clear();
-        };
+        let sums = vec![[0f64; 4]; window.area()];
+        let mut work = Work { rays, direct, record, sums, room: Room::default(), tiles: 0, background_tiles: 0 };
+        let mut batch = Batch::default();
         for code in 0..(EDGE * EDGE) as u32 {
             let (x, y) = (window.x0 + compact(code), window.y0 + compact(code >> 1));
             let Some(index) = window.index(x, y) else { continue };
             let pattern = rays.pattern(x, y);
             let mut sample = 0;
             while sample < spp {
-                sample = pending.push((x, y), pattern, sample..spp, index);
-                if pending.count == PACKETS * LANES {
-                    flush(&mut pending, &mut room);
+                sample = batch.push((x, y), pattern, sample..spp, index);
+                if batch.count == WAVE {
+                    work.tile(&mut batch);
                 }
             }
         }
-        if pending.count > 0 {
-            flush(&mut pending, &mut room);
-        }
+        work.tile(&mut batch);
+        work.finish(&mut batch);
         let share = 1.0 / f64::from(spp);
-        let pixels = sums.into_iter().map(|sum| sum.map(|x| (x * share) as f32)).collect();
-        BlockWork { pixels, room, tiles, background_tiles }
+        let pixels = work.sums.into_iter().map(|sum| sum.map(|x| (x * share) as f32)).collect();
+        let (tiles, background_tiles) = (work.tiles, work.background_tiles);
+        let Room { walk, rays, left_out, .. } = work.room;
+        BlockWork { pixels, rays, tests: walk.counts, left_out, tiles, background_tiles }
     }
 
     /// Puts the pixels where they belong.
@@ -93,30 +90,76 @@ impl Block {
     }
 }
 
-/// Samples that wait for their tile to fill.
-#[derive(Default)]
-struct Pending {
-    samples: [Samples8; PACKETS],
-    pixels: [[u32; LANES]; PACKETS],
-    count: usize,
+/// Work on a block.
+struct Work<'a, 's, R: Record> {
+    rays: &'a CameraRays,
+    direct: &'a Direct<'s>,
+    record: &'a mut R,
+    sums: Vec<[f64; 4]>,
+    room: Room,
+    tiles: u64,
+    background_tiles: u64,
 }
 
-impl Pending {
+/// Samples that wait for their tile to fill, and the pixels of all samples of the tiles before.
+#[derive(Default)]
+struct Batch {
+    samples: [Samples8; PACKETS],
+    count: usize,
+    pixels: Vec<[u32; LANES]>,
+    /// Samples with a tile of their own already.
+    traced: usize,
+}
+
+impl<R: Record> Work<'_, '_, R> {
+    /// Traces the samples that wait, and after some tiles what goes on from them.
+    fn tile(&mut self, batch: &mut Batch) {
+        if batch.count == 0 {
+            return;
+        }
+        if R::ON {
+            self.record.tile(batch.traced, &mut batch.samples());
+        }
+        let met = self.room.rays.hits[RayKind::Camera as usize];
+        batch.fill(self.room.camera_wave(self.rays.common_origin()), self.rays, self.direct.goes_on());
+        self.direct.trace_camera(&mut self.room, self.record);
+        self.tiles += 1;
+        self.background_tiles += u64::from(self.room.rays.hits[RayKind::Camera as usize] == met);
+        batch.traced += batch.count;
+        batch.count = 0;
+        if !self.direct.goes_on() || batch.traced == BATCH * WAVE {
+            self.finish(batch);
+        }
+    }
+
+    /// Traces what goes on and adds the samples to their pixels.
+    fn finish(&mut self, batch: &mut Batch) {
+        if self.direct.goes_on() {
+            self.direct.trace_later(&mut self.room, self.record);
+        }
+        batch.add_to(&self.room.samples, &mut self.sums);
+        self.room.begin();
+        (batch.traced, batch.count) = (0, 0);
+        batch.pixels.clear();
+    }
+}
+
+impl Batch {
     /// Adds samples of a pixel as far as their packet has room: the first one that is left.
     #[inline(always)]
     fn push(&mut self, place: (i32, i32), pattern: PixelPattern, samples: Range<u32>, pixel: usize) -> u32 {
         let (p, lane) = (self.count / LANES, self.count % LANES);
+        if lane == 0 {
+            self.pixels.push([pixel as u32; LANES]);
+        }
+        let Some(pixels) = self.pixels.last_mut() else { return samples.end };
         let count = LANES.min(lane + samples.len()) - lane;
         for (lane, sample) in (lane..lane + count).zip(samples.start..) {
             self.samples[p].set(lane, place, pattern, sample);
-            self.pixels[p][lane] = pixel as u32;
+            pixels[lane] = pixel as u32;
         }
         self.count += count;
         samples.start + count as u32
-    }
-
-    fn clear(&mut self) {
-        self.count = 0;
     }
 
     fn samples(&self) -> impl Iterator<Item = (i32, i32, u32)> {
@@ -124,25 +167,23 @@ impl Pending {
         (0..self.count).map(lane).map(|(samples, i)| (samples.x[i], samples.y[i], samples.index[i]))
     }
 
-    fn wave(&self, rays: &CameraRays, keep_exact: bool, room: &mut Room) -> Wave {
+    fn fill(&self, wave: &mut Wave, rays: &CameraRays, keep_exact: bool) {
         let count = |p: usize| self.count.saturating_sub(p * LANES).min(LANES);
-        let mut wave = Wave::camera(room.tile(rays.common_origin()), keep_exact);
         for (p, samples) in self.samples.iter().enumerate() {
             let exact = rays.exact(samples);
             wave.tile.packets[p] = rays.packet(&exact, count(p));
-            if let Some(kept) = &mut wave.exact {
-                kept[p] = exact;
+            if keep_exact {
+                wave.exact[p] = exact;
             }
         }
-        wave
     }
 
     fn add_to(&self, samples: &Samples, sums: &mut [[f64; 4]]) {
-        for p in 0..self.count.div_ceil(LANES) {
+        for (p, pixels) in self.pixels.iter().enumerate() {
             let (colors, alphas) = (samples.radiance[p].to_arrays(), samples.alpha[p].to_array());
-            for i in 0..LANES.min(self.count - p * LANES) {
+            for i in 0..LANES.min(self.traced - p * LANES) {
                 let [r, g, b] = colors[i].map(f64::from);
-                let sum = &mut sums[self.pixels[p][i] as usize];
+                let sum = &mut sums[pixels[i] as usize];
                 *sum = [sum[0] + r, sum[1] + g, sum[2] + b, sum[3] + f64::from(alphas[i])];
             }
         }

@@ -23,7 +23,7 @@ use crate::accel::Tree;
 use crate::film::{Picture, Window};
 use crate::integrate::{CameraRays, Direct, RayCounts, Record};
 use crate::output::{self, Description, Losses, Options, OutputError};
-use crate::plan::{InvalidScene, Plan, validate};
+use crate::plan::{InvalidScene, Plan, SkipSet, validate};
 use crate::scene::{Camera, ImageSettings, Scene};
 
 /// Which tracer finds the hits.
@@ -110,7 +110,7 @@ pub struct Renderer<'s> {
     max_depth: u32,
     seed: u64,
     threads: usize,
-    skip: bool,
+    skips: SkipSet,
     engine: Engine,
 }
 
@@ -148,7 +148,7 @@ impl<'s> Renderer<'s> {
             max_depth: scene.render.max_depth,
             seed: scene.render.seed,
             threads: 0,
-            skip: true,
+            skips: SkipSet::ALL,
             engine: Engine::Packet,
         })
     }
@@ -203,8 +203,13 @@ impl<'s> Renderer<'s> {
     }
 
     /// With `false`, does all the work, needed or not; the picture is the same to the bit.
-    pub fn skip(mut self, skip: bool) -> Self {
-        self.skip = skip;
+    pub fn skip(self, skip: bool) -> Self {
+        self.skips(if skip { SkipSet::ALL } else { SkipSet::NONE })
+    }
+
+    /// Which kinds of work may be left out where they are not needed; the picture is the same to the bit.
+    pub fn skips(mut self, skips: SkipSet) -> Self {
+        self.skips = skips;
         self
     }
 
@@ -289,7 +294,6 @@ pub struct Frame<'s> {
     rays: CameraRays,
     spp: u32,
     max_depth: u32,
-    skip: bool,
     plan_seconds: f64,
     build_seconds: f64,
 }
@@ -298,7 +302,7 @@ impl<'s> Frame<'s> {
     /// Plans and builds.
     pub fn prepare(renderer: &Renderer<'s>) -> Self {
         let start = Instant::now();
-        let plan = Plan::new(renderer.scene, renderer.camera.eye);
+        let plan = Plan::leaving_out(renderer.skips, renderer.scene, renderer.camera.eye);
         let parts = plan.parts();
         let plan_seconds = start.elapsed().as_secs_f64();
         let tree = Tree::new(parts, &plan.visible).one_by_one(renderer.engine == Engine::Single);
@@ -306,8 +310,7 @@ impl<'s> Frame<'s> {
         let image = &renderer.image;
         let display = (image.width, image.height);
         let rays = CameraRays::new(renderer.camera, plan.origin, display, image.filter, image.spp, renderer.seed);
-        let (max_depth, skip) = (renderer.max_depth, renderer.skip);
-        Frame { plan, tree, rays, spp: image.spp, max_depth, skip, plan_seconds, build_seconds }
+        Frame { plan, tree, rays, spp: image.spp, max_depth: renderer.max_depth, plan_seconds, build_seconds }
     }
 
     /// What the coordinates of its rays are relative to.
@@ -328,11 +331,11 @@ impl<'s> Frame<'s> {
     /// Traces one block on this thread, as a render does, while a record looks on: its pixels row by row.
     pub fn trace_block<R: Record>(&self, block: Window, record: &mut R) -> (Vec<[f32; 4]>, RayCounts) {
         let work = Block::new(block).trace(&self.rays, &self.direct(), self.spp, record);
-        (work.pixels, work.room.rays)
+        (work.pixels, work.rays)
     }
 
     fn direct(&self) -> Direct<'_> {
-        Direct::new(&self.plan, &self.tree, self.max_depth, self.skip)
+        Direct::new(&self.plan, &self.tree, self.max_depth)
     }
 
     fn stats(&self, threads: usize, trace_seconds: f64) -> Stats {

@@ -3,6 +3,7 @@
 use super::block::BlockWork;
 use crate::accel::Counts;
 use crate::integrate::RayCounts;
+use crate::plan::{LeftOut, Skipped};
 
 /// Work and time of one frame. Counts are exact and do not depend on threads; seconds are wall time.
 #[derive(Debug, Default, Clone, PartialEq)]
@@ -23,6 +24,10 @@ pub struct Stats {
     pub tiles: u64,
     /// Those in which no camera ray met anything.
     pub background_tiles: u64,
+    /// Work left out, and why.
+    pub skipped: Vec<Skipped>,
+    /// The same as counts, while blocks are put together.
+    pub(super) left_out: LeftOut,
     /// Memory of the columns.
     pub column_bytes: usize,
     /// Memory of the tree.
@@ -31,8 +36,9 @@ pub struct Stats {
 
 impl Stats {
     pub(super) fn add(&mut self, work: &BlockWork) {
-        self.rays.add(&work.room.rays);
-        self.tests.add(&work.room.walk.counts);
+        self.rays.add(&work.rays);
+        self.tests.add(&work.tests);
+        self.left_out.add(&work.left_out);
         self.tiles += work.tiles;
         self.background_tiles += work.background_tiles;
     }

@@ -101,6 +101,9 @@ impl<'s> Task<'s> {
                 Part::Row(row) => row.add_to(&mut picture, &mut stats),
             }
         }
+        if let Work::Blocks(frame, _) = &self.work {
+            stats.skipped = frame.plan.skips.report(&stats.left_out);
+        }
         Rendering { picture, stats }
     }
 }

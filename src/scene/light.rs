@@ -58,3 +58,13 @@ pub enum Falloff {
     /// Not at all, as NFF has it.
     None,
 }
+
+impl Source {
+    /// Whether it has no power.
+    pub fn is_dark(&self) -> bool {
+        match *self {
+            Source::Point { intensity: power, .. } | Source::Spot { intensity: power, .. } => power == DVec3::ZERO,
+            Source::Directional { irradiance, .. } => irradiance == DVec3::ZERO,
+        }
+    }
+}

@@ -101,6 +101,14 @@ impl Model {
         }
     }
 
+    /// Whether lights shine on it directly.
+    pub fn is_lit(&self) -> bool {
+        match self {
+            Model::Diffuse { .. } | Model::Phong { .. } => true,
+            Model::Mirror { .. } | Model::Dielectric { .. } => false,
+        }
+    }
+
     /// Whether rays go on from here.
     pub fn scatters(&self) -> bool {
         match *self {

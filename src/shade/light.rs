@@ -6,9 +6,9 @@ use crate::lanes::{Float8, Mask8, Vec3x8, float8};
 use crate::plan::Plan;
 use crate::scene::{Falloff, Source};
 
-/// All lights in f32, relative to the plan's origin.
+/// All lights that are asked, in f32, relative to the plan's origin, each with its index in the scene.
 #[derive(Debug)]
-pub struct LightTable(Vec<Illumination>);
+pub struct LightTable(Vec<(usize, Illumination)>);
 
 /// One light.
 #[derive(Debug, Clone, Copy)]
@@ -61,11 +61,12 @@ impl LightTable {
             };
             Illumination { toward, shadows: light.shadows, strength, square, cone }
         };
-        LightTable(plan.scene.lights.iter().map(light).collect())
+        let asked = plan.scene.lights.iter().enumerate().filter(|(index, _)| plan.lights[*index]);
+        LightTable(asked.map(|(index, source)| (index, light(source))).collect())
     }
 
     /// The lights in file order.
-    pub fn iter(&self) -> impl Iterator<Item = &Illumination> {
+    pub fn iter(&self) -> impl Iterator<Item = &(usize, Illumination)> {
         self.0.iter()
     }
 }

@@ -72,32 +72,27 @@ impl MaterialTable {
         MaterialTable(scene.materials.iter().map(|material| row(&material.model)).collect())
     }
 
-    /// Gathers the materials of eight hits; lanes that are not in `lanes` may hold anything.
+    /// Gathers the materials of eight hits.
     #[inline(always)]
-    pub fn gather(&self, materials: [u32; LANES]) -> Bsdf8 {
-        if materials.iter().all(|material| *material == materials[0]) {
-            return Bsdf8::splat(&self.0[materials[0] as usize]);
+    pub fn gather(&self, materials: [u32; LANES], bsdf: &mut Bsdf8) {
+        if materials == [materials[0]; LANES] {
+            *bsdf = Bsdf8::splat(&self.0[materials[0] as usize]);
+            return;
         }
         let rows = materials.map(|material| &self.0[material as usize]);
         let column = |f: fn(&Row) -> f32| Float8::from(rows.map(f));
-        Bsdf8 {
+        *bsdf = Bsdf8 {
             color: Vec3x8::from_fn(|i| rows[i].color),
             diffuse: column(|row| row.diffuse),
             specular: column(|row| row.specular),
             shine: column(|row| row.shine),
             lit: column(Row::lit),
-        }
+        };
     }
 
     /// How rays go on from a material.
     pub fn onward(&self, material: u32) -> Onward {
         self.0[material as usize].onward
-    }
-
-    /// Whether a material has a texture.
-    #[inline(always)]
-    pub fn is_textured(&self, material: u32) -> bool {
-        self.0[material as usize].texture.is_some()
     }
 
     /// The texture of a material.
@@ -113,6 +108,16 @@ impl MaterialTable {
 }
 
 impl Bsdf8 {
+    /// Black.
+    pub const NOTHING: Bsdf8 = Bsdf8 {
+        color: Vec3x8::ZERO,
+        diffuse: Float8::ZERO,
+        specular: Float8::ZERO,
+        shine: Float8::ZERO,
+        lit: Float8::ZERO,
+    };
+
+    #[inline(always)]
     fn splat(row: &Row) -> Self {
         Bsdf8 {
             color: Vec3x8::splat(row.color),
