@@ -90,8 +90,11 @@ fn convert_scene(args: &Args, run: &Run) -> Result<Exit, Failure> {
 
 fn convert_picture(args: &Args, run: &Run) -> Result<Exit, Failure> {
     let target = Target::new(&args.output, &[&args.input], run)?;
-    let options = args.depth.options(&target)?;
-    let picture = output::read(&args.input)?;
-    pictures::write(&picture, &target, options, &Description::default(), run)?;
+    let options = args.depth.options(&target, run)?;
+    let found = output::read_all(&args.input)?;
+    // What the header says of the scene is the title of a PNG, as it is of one that is rendered.
+    let scene = found.attributes.as_ref().and_then(|attributes| attributes.text("render/scene"));
+    let description = Description { scene, kept: found.attributes, ..Description::default() };
+    pictures::write(&found.picture, &target, options, &description, run)?;
     Ok(Exit::Done)
 }

@@ -38,8 +38,8 @@ use std::process::ExitCode;
 use std::sync::LazyLock;
 use std::time::Instant;
 
-use clap::{Parser, Subcommand};
-use octray::output::aside;
+use clap::{Parser, Subcommand, ValueEnum};
+use octray::output::{ColorSpace, aside};
 
 use self::console::{Console, When};
 use self::exit::{Exit, Failure};
@@ -64,9 +64,9 @@ build needs; 130 and 143 stopped by a signal.";
 #[derive(Debug, Parser)]
 #[command(name = "octray", version = VERSION.as_str(), after_help = EXAMPLES, max_term_width = 100)]
 struct Cli {
-    /// When to use colours in messages
-    #[arg(long, global = true, value_enum, value_name = "WHEN", default_value_t)]
-    color: When,
+    /// When to use colours in messages; or the primaries of an EXR, where one is written
+    #[arg(long, global = true, value_enum, value_name = "WHEN")]
+    color: Vec<Color>,
     /// Say nothing but errors
     #[arg(short, long, global = true)]
     quiet: bool,
@@ -94,6 +94,43 @@ enum Command {
     Man(manual::ManArgs),
 }
 
+/// The two things that `--color` is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Color {
+    /// Colours in messages on a terminal, unless NO_COLOR is set (usual)
+    Auto,
+    /// Colours in messages always
+    Always,
+    /// Colours in messages never
+    Never,
+    /// EXR files in linear Rec. 709, which readers take for granted (usual)
+    Rec709,
+    /// EXR files in ACEScg
+    Acescg,
+}
+
+impl Cli {
+    fn messages(&self) -> When {
+        let when = |color: &Color| match color {
+            Color::Auto => Some(When::Auto),
+            Color::Always => Some(When::Always),
+            Color::Never => Some(When::Never),
+            Color::Rec709 | Color::Acescg => None,
+        };
+        self.color.iter().rev().find_map(when).unwrap_or_default()
+    }
+
+    /// Of an EXR, if they are said.
+    fn primaries(&self) -> Option<ColorSpace> {
+        let space = |color: &Color| match color {
+            Color::Rec709 => Some(ColorSpace::Rec709),
+            Color::Acescg => Some(ColorSpace::AcesCg),
+            Color::Auto | Color::Always | Color::Never => None,
+        };
+        self.color.iter().rev().find_map(space)
+    }
+}
+
 /// What surrounds a command.
 #[derive(Debug)]
 pub struct Run {
@@ -101,6 +138,8 @@ pub struct Run {
     start: Instant,
     console: Console,
     signals: Signals,
+    /// The primaries of EXR files, where the command line says them.
+    color_space: Option<ColorSpace>,
 }
 
 impl Run {
@@ -138,7 +177,13 @@ pub fn run() -> ExitCode {
             return ExitCode::from(u8::try_from(message.exit_code()).unwrap_or(Exit::Usage as u8));
         }
     };
-    let run = Run { start, console: Console::new(cli.color, cli.quiet), signals: Signals::watch() };
+    let (console, color_space) = (Console::new(cli.messages(), cli.quiet), cli.primaries());
+    let run = Run { start, console, signals: Signals::watch(), color_space };
+    let writes_exr = matches!(cli.command, Command::Render(_) | Command::Convert(_));
+    if run.color_space.is_some() && !writes_exr {
+        run.console.error("--color rec709 and acescg are about EXR files, and this command writes none");
+        return ExitCode::from(Exit::Usage as u8);
+    }
     let result = match &cli.command {
         Command::Render(args) => render::run(args, &run),
         Command::Info(args) => info::run(args, &run),

@@ -3,9 +3,13 @@
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
+use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum};
 use octray::film::Picture;
-use octray::output::{self, Bits, Coding, Description, Display, Format, Losses, Options, OutputError, ToneMap, aside};
+use octray::output::{
+    self, Bits, Coding, Compression, Description, Display, Format, Losses, Options, OutputError, Storage, ToneMap,
+    aside,
+};
 
 use super::Run;
 use super::exit::{Exit, Failure};
@@ -13,9 +17,22 @@ use super::exit::{Exit, Failure};
 /// How samples are stored.
 #[derive(Debug, Clone, Args)]
 pub struct Depth {
-    /// EXR: store 32-bit floats instead of 16-bit ones
+    /// EXR: store colour in 32-bit floats instead of 16-bit ones
     #[arg(long)]
     float: bool,
+    /// EXR: how samples are packed [default: zips]. pxr24, dwaa and dwab lose something; layers of 32 bits are kept from
+    /// them, in a part of their own
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Compression::ALL.map(Compression::name)))]
+    compression: Option<String>,
+    /// EXR: a part for each layer, instead of one for all
+    #[arg(long)]
+    multipart: bool,
+    /// EXR: the name of the depth channel [default: depth.Z]
+    #[arg(long, value_name = "NAME", value_parser = ["Z", "depth.Z"])]
+    depth_name: Option<String>,
+    /// EXR: Cryptomatte manifests in .json files beside the picture, not only those that are too long for its header
+    #[arg(long)]
+    crypto_sidecar: bool,
     /// PNG: bits a sample, 8 (usual) or 16
     #[arg(long, value_name = "8|16", value_parser = ["8", "16"])]
     bits: Option<String>,
@@ -58,6 +75,10 @@ impl From<ToneMapName> for ToneMap {
             ToneMapName::Khronos => ToneMap::Khronos,
         }
     }
+}
+
+fn first_given<const N: usize>(given: [(bool, &'static str); N]) -> Option<&'static str> {
+    given.into_iter().find_map(|(given, name)| given.then_some(name))
 }
 
 fn stops(text: &str) -> Result<f32, String> {
@@ -115,31 +136,55 @@ impl std::fmt::Display for Target {
 impl Depth {
     /// Whether the user chose anything.
     pub fn is_given(&self) -> bool {
-        self.float || self.of_png().is_some()
+        self.of_exr().or(self.of_png()).is_some()
+    }
+
+    /// The first option given that is for EXR alone.
+    fn of_exr(&self) -> Option<&'static str> {
+        first_given([
+            (self.float, "--float"),
+            (self.compression.is_some(), "--compression"),
+            (self.multipart, "--multipart"),
+            (self.depth_name.is_some(), "--depth-name"),
+            (self.crypto_sidecar, "--crypto-sidecar"),
+        ])
     }
 
     /// The first option given that is for PNG alone.
     fn of_png(&self) -> Option<&'static str> {
-        let given = [
+        first_given([
             (self.bits.is_some(), "--bits"),
             (self.exposure.is_some(), "--exposure"),
             (self.white.is_some(), "--white"),
             (self.tonemap.is_some(), "--tonemap"),
             (self.no_dither, "--no-dither"),
-        ];
-        given.into_iter().find_map(|(given, name)| given.then_some(name))
+        ])
     }
 
     /// The options for a target, which must be of the format that they are for.
-    pub fn options(&self, target: &Target) -> Result<Options, Failure> {
+    pub fn options(&self, target: &Target, run: &Run) -> Result<Options, Failure> {
         let usage = |text: String| Err(Failure::new(Exit::Usage, text));
-        match (target.format(), self.of_png()) {
-            (Format::Exr, Some("--bits")) => {
+        let color = run.color_space.map(|_| "--color rec709|acescg");
+        match (target.format(), self.of_png(), self.of_exr().or(color)) {
+            (Format::Exr, Some("--bits"), _) => {
                 usage("--bits is for PNG: an EXR has 16 bits a sample, or 32 with --float".into())
             }
-            (Format::Exr, Some(name)) => usage(format!("{name} is for PNG: an EXR holds the light itself")),
-            (Format::Png, _) if self.float => usage("--float is for EXR: a PNG has --bits 8 or --bits 16".into()),
-            _ => Ok(Options { float: self.float, coding: self.coding() }),
+            (Format::Exr, Some(name), _) => usage(format!("{name} is for PNG: an EXR holds the light itself")),
+            (Format::Png, _, Some("--float")) => usage("--float is for EXR: a PNG has --bits 8 or --bits 16".into()),
+            (Format::Png, _, Some(name)) => usage(format!("{name} is for EXR: a PNG has one way to store a picture")),
+            _ => Ok(Options { exr: self.storage(run), coding: self.coding() }),
+        }
+    }
+
+    fn storage(&self, run: &Run) -> Storage {
+        let named = |name: &String| Compression::ALL.into_iter().find(|compression| compression.name() == *name);
+        Storage {
+            float: self.float,
+            compression: self.compression.as_ref().and_then(named).unwrap_or_default(),
+            multipart: self.multipart,
+            root_depth: self.depth_name.as_deref() == Some("Z"),
+            color: run.color_space.unwrap_or_default(),
+            sidecar: self.crypto_sidecar,
         }
     }
 
@@ -162,21 +207,27 @@ pub fn write(
     description: &Description,
     run: &Run,
 ) -> Result<(), Failure> {
-    let encoded = match target.format() {
-        Format::Exr => output::exr::encode(picture, options.float, description),
-        Format::Png => output::png::encode(picture, options.coding, description),
+    let name = match target {
+        Target::File(path, _) => output::stem(path),
+        Target::Stdout => None,
     };
-    let (bytes, losses) =
-        encoded.map_err(|error| Failure::new(Exit::Output, format!("{target}: cannot be encoded: {error}")))?;
+    let description = Description { file_stem: name, ..description.clone() };
+    let encoded = output::encode(target.format(), picture, options, &description)
+        .map_err(|error| Failure::new(Exit::Output, format!("{target}: cannot be encoded: {error}")))?;
     match target {
-        Target::File(path, _) => write_bytes(path, &bytes, run)?,
+        Target::File(path, _) => {
+            for file in &encoded.beside {
+                write_bytes(&path.with_file_name(&file.name), &file.bytes, run)?;
+            }
+            write_bytes(path, &encoded.bytes, run)?;
+        }
         Target::Stdout => {
             let mut out = io::stdout().lock();
-            let written = out.write_all(&bytes).and_then(|()| out.flush());
+            let written = out.write_all(&encoded.bytes).and_then(|()| out.flush());
             written.map_err(|error| Failure::output(Path::new("standard output"), &error))?;
         }
     }
-    tell(losses, target, run);
+    tell(encoded.losses, target, run);
     Ok(())
 }
 

@@ -147,7 +147,7 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
 fn render(args: &Args, scenes: &mut Frames, frame: i64, output: PathBuf, run: &Run) -> Result<Exit, Failure> {
     let start = Instant::now();
     let target = Target::new(&output, &[&args.scene], run)?;
-    let options = args.depth.options(&target)?;
+    let options = args.depth.options(&target, run)?;
     if let Some(stats) = &args.stats.stats {
         if *stats == output {
             return Err(Failure::new(Exit::Usage, format!("{}: both the picture and --stats", stats.display())));

@@ -2,6 +2,7 @@
 
 use std::time::{Duration, SystemTime};
 
+use super::exr::Attributes;
 use crate::scene::Camera;
 
 /// Where a picture comes from. All of it goes into an EXR header, the title also into a PNG.
@@ -27,6 +28,10 @@ pub struct Description {
     pub owner: Option<String>,
     /// Any words.
     pub comments: Option<String>,
+    /// The file's own name without extension; manifests beside it are named after it.
+    pub file_stem: Option<String>,
+    /// Attributes of the file that the picture was read from: written again, unless something here says otherwise.
+    pub kept: Option<Attributes>,
     /// The run that made it; `None` leaves out everything that differs between two runs.
     pub run: Option<Run>,
 }

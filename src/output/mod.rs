@@ -6,9 +6,11 @@
 //! What the pixels mean is settled before: scene-linear, premultiplied ([`Picture`]).
 
 pub mod aside;
+mod color;
 pub mod description;
 mod display;
 pub mod exr;
+mod pixel_hash;
 pub mod png;
 pub mod read;
 pub mod srgb;
@@ -20,8 +22,9 @@ use thiserror::Error;
 
 pub use self::description::{Description, Run};
 pub use self::display::{Display, ToneMap};
+pub use self::exr::{Attributes, Beside, ColorSpace, Compression, Encoded, Storage};
 pub use self::png::{Bits, Coding};
-pub use self::read::{ReadError, read};
+pub use self::read::{Contents, HashPair, ReadError, read, read_all};
 use crate::film::Picture;
 
 /// The kinds of file that a picture can become.
@@ -48,8 +51,8 @@ impl Format {
 /// How samples are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Options {
-    /// EXR: 32-bit floats instead of halves.
-    pub float: bool,
+    /// EXR: types, compression, parts.
+    pub exr: Storage,
     /// PNG: bits per sample, and what a display is to show.
     pub coding: Coding,
 }
@@ -114,14 +117,39 @@ pub fn write(
     options: Options,
     description: &Description,
 ) -> Result<Losses, OutputError> {
-    let encoded = match Format::of(path) {
-        Some(Format::Exr) => exr::encode(picture, options.float, description),
-        Some(Format::Png) => png::encode(picture, options.coding, description),
-        None => return Err(OutputError::Format { path: path.into() }),
-    };
-    let (bytes, losses) = encoded.map_err(|reason| OutputError::Encode { path: path.into(), reason: reason.0 })?;
-    aside::write(path, &bytes)?;
-    Ok(losses)
+    let format = Format::of(path).ok_or_else(|| OutputError::Format { path: path.into() })?;
+    let described = Description { file_stem: stem(path), ..description.clone() };
+    let encoded = encode(format, picture, options, &described);
+    let encoded = encoded.map_err(|reason| OutputError::Encode { path: path.into(), reason: reason.0 })?;
+    for file in &encoded.beside {
+        aside::write(&path.with_file_name(&file.name), &file.bytes)?;
+    }
+    aside::write(path, &encoded.bytes)?;
+    Ok(encoded.losses)
+}
+
+/// The bytes of a picture's file, and what else belongs to it.
+///
+/// # Errors
+/// A picture that is not whole, or does not fit the format.
+pub fn encode(
+    format: Format,
+    picture: &Picture,
+    options: Options,
+    description: &Description,
+) -> Result<Encoded, EncodeError> {
+    match format {
+        Format::Exr => exr::encode(picture, options.exr, description),
+        Format::Png => {
+            let (bytes, losses) = png::encode(picture, options.coding, description)?;
+            Ok(Encoded { bytes, losses, beside: Vec::new() })
+        }
+    }
+}
+
+/// The name of a file without directory and extension, after which files beside it are named.
+pub fn stem(path: &Path) -> Option<String> {
+    path.file_stem().map(|stem| stem.to_string_lossy().into_owned())
 }
 
 /// Why a picture cannot be encoded: it is not whole, or too large for the format.

@@ -153,7 +153,7 @@ impl Losses {
         self.clamped += u64::from(!(0.0..=1.0).contains(&value));
     }
 
-    fn and(self, other: Losses) -> Losses {
+    pub(super) fn and(self, other: Losses) -> Losses {
         Losses { clamped: self.clamped + other.clamped, dropped: self.dropped + other.dropped }
     }
 }

@@ -1,20 +1,26 @@
-//! EXR: the colours of the first part, chunk by chunk.
+//! EXR: colour and layers of all flat parts, chunk by chunk.
 //!
 //! Chunks are taken one by one, so that what they promise can be held against their size before they are decoded.
 
 use std::io::{BufRead, Seek};
+use std::path::Path;
 
 use exr::block::chunk::{Chunk, CompressedBlock};
 use exr::block::lines::LineRef;
 use exr::block::reader::ChunksReader;
 use exr::block::{self, UncompressedBlock};
 use exr::math::Vec2;
-use exr::meta::attribute::{Compression, SampleType};
+use exr::meta::attribute::{AttributeValue, ChannelDescription, Compression, SampleType, Text};
 use exr::meta::header::Header;
+use glam::DVec2;
 use half::f16;
 
-use super::{Fault, check_length, check_pixels};
-use crate::film::{Picture, Window};
+use super::mattes;
+use super::{Contents, Fault, HashPair, check_length, check_pixels};
+use crate::film::{Channel, Picture, Samples, Window};
+use crate::output::color::{self, Primaries};
+use crate::output::exr::{Attributes, PIXEL_HASH};
+use crate::output::pixel_hash::{Digests, PixelHash};
 
 impl From<exr::error::Error> for Fault {
     fn from(error: exr::error::Error) -> Self {
@@ -27,83 +33,308 @@ impl From<exr::error::Error> for Fault {
     }
 }
 
-pub(super) fn read(reader: impl BufRead + Seek, length: usize) -> Result<Picture, Fault> {
+/// Reads a file; manifests that it names are looked for in `directory`.
+pub(super) fn read(reader: impl BufRead + Seek, length: usize, directory: &Path) -> Result<Contents, Fault> {
     let chunks = block::read(reader, false)?;
-    let header = chunks.headers().first().cloned().ok_or_else(|| Fault::Damaged("it has no header".into()))?;
-    let slots = slots(&header);
-    check_header(&header, length)?;
-    let (display, window) = windows(&header)?;
-    let mut picture = Picture { pixels: vec![[0.0, 0.0, 0.0, 1.0]; window.area()], ..Picture::new(display, window) };
+    let plan = Plan::new(chunks.headers(), length)?;
+    let mut sums = plan.sums(chunks.headers());
+    let mut picture = plan.picture();
     // Strict about the places of chunks, so that none is missed in silence.
-    let chunks = chunks.filter_chunks(true, |_, tile, block| block.layer == 0 && tile.level_index == Vec2(0, 0))?;
+    let chunks = chunks
+        .filter_chunks(true, |_, tile, block| plan.parts[block.layer].is_some() && tile.level_index == Vec2(0, 0))?;
     let meta = chunks.meta_data().clone();
     for chunk in chunks {
         let chunk = chunk?;
-        check_chunk(&header, &chunk)?;
+        let layer = chunk.layer_index;
+        let (header, Some(part)) = (&meta.headers[layer], &plan.parts[layer]) else { continue };
+        check_chunk(header, &chunk)?;
         let block = UncompressedBlock::decompress_chunk(chunk, &meta, true)?;
         for line in block.lines(&header.channels) {
-            let channel = line.location.channel;
-            fill(&mut picture, line, header.channels.list[channel].sample_type, slots[channel])?;
+            let kind = header.channels.list[line.location.channel].sample_type;
+            if let Some(sums) = &mut sums {
+                sums.add(layer, &line, kind);
+            }
+            part.fill(&mut picture, line, kind)?;
         }
     }
-    Ok(picture)
+    plan.finish(&meta.headers, picture, sums, directory)
 }
 
-/// Which samples of a pixel each channel of the file becomes.
-fn slots(header: &Header) -> Vec<&'static [usize]> {
-    let grey = !has(header, "R");
-    let slot = |name: &[u8]| -> &'static [usize] {
-        match name {
-            b"R" => &[0],
-            b"G" if !grey => &[1],
-            b"B" if !grey => &[2],
-            b"A" => &[3],
-            b"Y" if grey => &[0, 1, 2],
-            _ => &[],
+/// What becomes of each part of a file.
+struct Plan {
+    display: (u32, u32),
+    window: Window,
+    /// By the number of the part; `None` for one that is not read.
+    parts: Vec<Option<Part>>,
+    /// Channels beside the colour, with their types.
+    names: Vec<(String, SampleType)>,
+    /// The part that holds the colour.
+    color: usize,
+}
+
+struct Part {
+    /// What becomes of each channel.
+    slots: Vec<Slot>,
+    /// Where its window begins in that of the picture.
+    offset: (i64, i64),
+}
+
+/// What a channel of the file becomes.
+#[derive(Debug, Clone, Copy)]
+enum Slot {
+    /// These samples of a pixel.
+    Color(&'static [usize]),
+    /// A channel beside the colour.
+    Channel(usize),
+}
+
+impl Plan {
+    fn new(headers: &[Header], length: usize) -> Result<Plan, Fault> {
+        let color = color_part(headers)?;
+        check_header(&headers[color], length)?;
+        let (display, window) = windows(&headers[color])?;
+        let mut plan = Plan { display, window, parts: Vec::new(), names: Vec::new(), color };
+        for (number, header) in headers.iter().enumerate() {
+            let part = match unread(header) {
+                Some(_) => None,
+                None => {
+                    check_header(header, length)?;
+                    Some(plan.part(number, header)?)
+                }
+            };
+            plan.parts.push(part);
         }
+        // Layers smaller than the picture are held in its size.
+        let bytes = window.area().saturating_mul(plan.names.len().saturating_mul(4));
+        check_length(bytes, LARGEST_EXPANSION, length)?;
+        Ok(plan)
+    }
+
+    fn part(&mut self, number: usize, header: &Header) -> Result<Part, Fault> {
+        let (_, window) = windows(header)?;
+        let offset =
+            (i64::from(window.x0) - i64::from(self.window.x0), i64::from(window.y0) - i64::from(self.window.y0));
+        let mut slots = Vec::new();
+        for channel in &header.channels.list {
+            let bytes = channel.name.as_slice();
+            let color = if number == self.color { color_slot(header, bytes) } else { None };
+            let slot = match color {
+                Some(slots) => Slot::Color(slots),
+                None => {
+                    let name = self.name(header, &String::from_utf8_lossy(bytes))?;
+                    self.names.push((name, channel.sample_type));
+                    Slot::Channel(self.names.len() - 1)
+                }
+            };
+            slots.push(slot);
+        }
+        Ok(Part { slots, offset })
+    }
+
+    /// The full name of a channel: with the name of its part where it has no layer, or the name is taken.
+    fn name(&self, header: &Header, name: &str) -> Result<String, Fault> {
+        let taken = |name: &str| self.names.iter().any(|(known, _)| known == name);
+        let part = header.own_attributes.layer_name.as_ref().map(|part| String::from_utf8_lossy(part.as_slice()));
+        let longer = part.map(|part| format!("{part}.{name}"));
+        let first = if self.parts.len() == self.color || name.contains('.') { Some(name.to_owned()) } else { None };
+        let mut names = first.into_iter().chain(longer).chain([name.to_owned()]);
+        let free = names.find(|name| !taken(name));
+        free.ok_or_else(|| Fault::Unsupported(format!("two of its channels are called \"{name}\"")))
+    }
+
+    fn picture(&self) -> Picture {
+        let area = self.window.area();
+        let channel = |(name, kind): &(String, SampleType)| Channel {
+            name: name.clone(),
+            samples: match kind {
+                SampleType::F16 => Samples::Half(vec![0.0; area]),
+                SampleType::F32 => Samples::Float(vec![0.0; area]),
+                SampleType::U32 => Samples::Uint(vec![0; area]),
+            },
+        };
+        Picture {
+            pixels: vec![[0.0, 0.0, 0.0, 1.0]; area],
+            channels: self.names.iter().map(channel).collect(),
+            window: self.window,
+            display: self.display,
+            cryptomattes: Vec::new(),
+        }
+    }
+
+    /// Nothing yet; for files that state no hash, nothing ever.
+    fn sums(&self, headers: &[Header]) -> Option<Sums> {
+        stored_hash(headers)?;
+        let count = |part: &Option<Part>| part.as_ref().map_or(0, |part| part.slots.len());
+        Some(Sums(self.parts.iter().map(|part| vec![Digests::default(); count(part)]).collect()))
+    }
+
+    fn finish(
+        self,
+        headers: &[Header],
+        mut picture: Picture,
+        sums: Option<Sums>,
+        directory: &Path,
+    ) -> Result<Contents, Fault> {
+        let header = &headers[self.color];
+        picture.cryptomattes = mattes::read(headers, directory);
+        if let Some(matrix) = to_rec709(header)? {
+            picture = color::converted(&picture, matrix).into_owned();
+        }
+        let is_float = |channel: &ChannelDescription| {
+            color_slot(header, channel.name.as_slice()).is_some() && channel.sample_type != SampleType::F16
+        };
+        Ok(Contents {
+            picture,
+            float: header.channels.list.iter().any(is_float),
+            attributes: Some(Attributes {
+                shared: header.shared_attributes.clone(),
+                own: header.own_attributes.clone(),
+            }),
+            pixel_hash: sums.and_then(|sums| sums.compare(&self, headers)),
+        })
+    }
+}
+
+/// The digests of all rows, by part and channel.
+struct Sums(Vec<Vec<Digests>>);
+
+impl Sums {
+    fn add(&mut self, layer: usize, line: &LineRef<'_>, kind: SampleType) {
+        let place = line.location;
+        self.0[layer][place.channel].push(place.position.y(), line.value, kind);
+    }
+
+    fn compare(self, plan: &Plan, headers: &[Header]) -> Option<HashPair> {
+        let mut hash = PixelHash::new(plan.display, plan.window);
+        for (header, digests) in headers.iter().zip(&self.0) {
+            for (channel, rows) in header.channels.list.iter().zip(digests) {
+                hash.add(channel.name.as_slice(), channel.sample_type, [rows].into_iter());
+            }
+        }
+        Some(HashPair { stored: stored_hash(headers)?, found: hash.finish() })
+    }
+}
+
+/// The hash of the samples that a file states.
+fn stored_hash(headers: &[Header]) -> Option<String> {
+    let name = Text::from(PIXEL_HASH);
+    headers.iter().find_map(|header| match header.own_attributes.other.get(&name)? {
+        AttributeValue::Text(text) => Some(text.to_string()),
+        _ => None,
+    })
+}
+
+/// The first part with colours that is read.
+fn color_part(headers: &[Header]) -> Result<usize, Fault> {
+    let has_color = |header: &Header| match has(header, "R") {
+        true => has(header, "G") && has(header, "B"),
+        false => has(header, "Y"),
     };
-    header.channels.list.iter().map(|channel| slot(channel.name.as_slice())).collect()
+    let found = headers.iter().position(|header| unread(header).is_none() && has_color(header));
+    found.ok_or_else(|| {
+        let Some(first) = headers.first() else { return Fault::Damaged("it has no header".into()) };
+        if let Some(reason) = unread(first) {
+            return Fault::Unsupported(reason.into());
+        }
+        let names: Vec<_> = first.channels.list.iter().take(12).map(|channel| channel.name.to_string()).collect();
+        Fault::Unsupported(format!("its first part has no channels R G B, but {}", names.join(" ")))
+    })
 }
 
-/// Puts a line of one channel into its place.
-fn fill(picture: &mut Picture, line: LineRef<'_>, kind: SampleType, slots: &[usize]) -> Result<(), Fault> {
-    if slots.is_empty() {
-        return Ok(());
+/// Why a part is not read, if it is not.
+fn unread(header: &Header) -> Option<&'static str> {
+    if header.deep {
+        return Some("it holds deep data");
     }
-    let Vec2(x, y) = line.location.position;
-    let start = y * picture.window.width() + x;
-    let pixels = picture.pixels.get_mut(start..start + line.location.sample_count);
-    let pixels = pixels.ok_or_else(|| Fault::Damaged("a line lies outside its window".into()))?;
-    let mut put = |index: usize, value: f32| slots.iter().for_each(|&slot| pixels[index][slot] = value);
-    match kind {
-        SampleType::F16 => line.read_samples::<f16>().enumerate().try_for_each(|(i, v)| v.map(|v| put(i, v.to_f32()))),
-        SampleType::F32 => line.read_samples::<f32>().enumerate().try_for_each(|(i, v)| v.map(|v| put(i, v))),
-        SampleType::U32 => line.read_samples::<u32>().enumerate().try_for_each(|(i, v)| v.map(|v| put(i, v as f32))),
-    }?;
-    Ok(())
+    header.channels.list.iter().any(|channel| channel.sampling != Vec2(1, 1)).then_some("it holds subsampled channels")
+}
+
+/// Which samples of a pixel a channel becomes.
+fn color_slot(header: &Header, name: &[u8]) -> Option<&'static [usize]> {
+    let grey = !has(header, "R");
+    match name {
+        b"R" => Some(&[0]),
+        b"G" if !grey => Some(&[1]),
+        b"B" if !grey => Some(&[2]),
+        b"A" => Some(&[3]),
+        b"Y" if grey => Some(&[0, 1, 2]),
+        _ => None,
+    }
 }
 
 fn has(header: &Header, name: &str) -> bool {
     header.channels.list.iter().any(|channel| channel.name == *name)
 }
 
-/// Refuses what is not read here, and sizes that a file of this length cannot hold.
+/// The matrix that takes the file's colours to Rec. 709, where they are others.
+fn to_rec709(header: &Header) -> Result<Option<glam::DMat3>, Fault> {
+    let Some(found) = header.shared_attributes.chromaticities else { return Ok(None) };
+    let xy = [found.red, found.green, found.blue, found.white].map(|Vec2(x, y)| DVec2::new(x.into(), y.into()));
+    let primaries = Primaries { xy };
+    if primaries.is_near(&Primaries::REC709) {
+        return Ok(None);
+    }
+    let matrix = primaries.matrix_to(Primaries::REC709);
+    matrix.map(Some).ok_or_else(|| Fault::Damaged("its chromaticities span no colours".into()))
+}
+
+impl Part {
+    /// Puts a line of one channel into its place, as far as it lies in the picture's window.
+    fn fill(&self, picture: &mut Picture, line: LineRef<'_>, kind: SampleType) -> Result<(), Fault> {
+        let window = picture.window;
+        let Vec2(x, y) = line.location.position;
+        let (x, y) = (x as i64 + self.offset.0, y as i64 + self.offset.1);
+        if y < 0 || y >= window.height() as i64 {
+            return Ok(());
+        }
+        let end = (x + line.location.sample_count as i64).min(window.width() as i64);
+        let skipped = (-x).max(0) as usize;
+        let Some(count) = usize::try_from(end - x.max(0)).ok().filter(|count| *count > 0) else { return Ok(()) };
+        let start = y as usize * window.width() + x.max(0) as usize;
+        let row = start..start + count;
+        match self.slots[line.location.channel] {
+            Slot::Color(slots) => {
+                let pixels = &mut picture.pixels[row];
+                let mut put = |index: usize, value: f32| slots.iter().for_each(|&slot| pixels[index][slot] = value);
+                for (index, value) in floats(&line, kind)?.into_iter().skip(skipped).take(count).enumerate() {
+                    put(index, value);
+                }
+            }
+            Slot::Channel(channel) => match &mut picture.channels[channel].samples {
+                Samples::Half(samples) | Samples::Float(samples) => {
+                    samples[row].copy_from_slice(&floats(&line, kind)?[skipped..skipped + count]);
+                }
+                Samples::Uint(samples) => {
+                    let found = line.read_samples::<u32>().skip(skipped);
+                    samples[row]
+                        .iter_mut()
+                        .zip(found)
+                        .try_for_each(|(slot, value)| value.map(|value| *slot = value))?;
+                }
+            },
+        }
+        Ok(())
+    }
+}
+
+fn floats(line: &LineRef<'_>, kind: SampleType) -> Result<Vec<f32>, Fault> {
+    let samples: Result<Vec<f32>, exr::error::Error> = match kind {
+        SampleType::F16 => line.read_samples::<f16>().map(|value| value.map(f16::to_f32)).collect(),
+        SampleType::F32 => line.read_samples::<f32>().collect(),
+        SampleType::U32 => line.read_samples::<u32>().map(|value| value.map(|value| value as f32)).collect(),
+    };
+    Ok(samples?)
+}
+
+/// Refuses sizes that a file of this length cannot hold.
 fn check_header(header: &Header, length: usize) -> Result<(), Fault> {
-    let unsupported = |reason: &str| Err(Fault::Unsupported(reason.into()));
-    if header.deep {
-        return unsupported("it holds deep data");
-    }
-    if header.channels.list.iter().any(|channel| channel.sampling != Vec2(1, 1)) {
-        return unsupported("it holds subsampled channels");
-    }
-    if !["R", "G", "B"].iter().all(|name| has(header, name)) && (has(header, "R") || !has(header, "Y")) {
-        let names: Vec<_> = header.channels.list.iter().take(12).map(|channel| channel.name.to_string()).collect();
-        return unsupported(&format!("its first part has no channels R G B, but {}", names.join(" ")));
-    }
     let Vec2(width, height) = header.layer_size;
     let bytes = check_pixels(width, height)?.saturating_mul(header.channels.bytes_per_pixel);
     check_length(bytes, most_expansion(header.compression), length)
 }
+
+/// The most of [`most_expansion`].
+const LARGEST_EXPANSION: usize = 1 << 17;
 
 /// Bytes that one byte of a file can become at most, generously: zlib reaches 1032 (its "Technical Details" page),
 /// run lengths 64, PIZ some 500 (255 samples of two bytes for nine bits), B44 at most 16; DWA stores one number for
@@ -191,7 +422,8 @@ mod tests {
     }
 
     fn decoded(bytes: &[u8]) -> Result<Picture, String> {
-        read(Cursor::new(bytes), bytes.len()).map_err(|fault| match fault {
+        let found = read(Cursor::new(bytes), bytes.len(), Path::new("."));
+        found.map(|contents| contents.picture).map_err(|fault| match fault {
             Fault::Io(error) => error.to_string(),
             Fault::Damaged(reason) | Fault::Unsupported(reason) => reason,
         })

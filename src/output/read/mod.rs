@@ -4,6 +4,7 @@
 //! ask for much memory.
 
 mod exr;
+mod mattes;
 mod png;
 
 use std::fs::File;
@@ -12,6 +13,7 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
+use super::exr::Attributes;
 use crate::film::Picture;
 
 /// Pixels of the largest picture that is read: the largest that a scene may ask for.
@@ -59,16 +61,48 @@ enum Fault {
     Unsupported(String),
 }
 
-/// Reads a picture, linear and premultiplied.
+/// What a file holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Contents {
+    /// The picture with its layers, linear Rec. 709 and premultiplied.
+    pub picture: Picture,
+    /// Whether colour has more bits than halves.
+    pub float: bool,
+    /// Of an EXR: what its header says beside.
+    pub attributes: Option<Attributes>,
+    /// The hash of its samples that an EXR states, and the one that they have.
+    pub pixel_hash: Option<HashPair>,
+}
+
+/// A hash as it is stated, and as it is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct HashPair {
+    /// What the file's header says.
+    pub stored: String,
+    /// What the file's samples give.
+    pub found: String,
+}
+
+/// Reads a picture: [`read_all`] without what stands beside it.
 ///
-/// EXR: the first flat part with channels `R G B` (and `A`, else 1) or `Y`, of type half, float or uint, any
-/// compression but HTJ2K; where the display window begins elsewhere than at (0, 0), both windows move. PNG: any
+/// # Errors
+/// Any [`ReadError`]; each names the path and the cause.
+pub fn read(path: &Path) -> Result<Picture, ReadError> {
+    read_all(path).map(|contents| contents.picture)
+}
+
+/// Reads a picture, linear Rec. 709 and premultiplied, and what stands beside it.
+///
+/// EXR: colour is that of the first part with channels `R G B` (and `A`, else 1) or `Y`, in the primaries that the file
+/// states; all other channels of all flat parts are layers, with the name of their part before theirs where they have
+/// none. Types are half, float or uint, compressions all but HTJ2K; layers that cover other pixels than the colour
+/// are cut or filled up with 0. Where the display window begins elsewhere than at (0, 0), all windows move. PNG: any
 /// depth and colour type, by the sRGB curve whatever its chunks say, alpha multiplied in; its window is the full
 /// frame.
 ///
 /// # Errors
 /// Any [`ReadError`]; each names the path and the cause.
-pub fn read(path: &Path) -> Result<Picture, ReadError> {
+pub fn read_all(path: &Path) -> Result<Contents, ReadError> {
     let io = |source| ReadError::Io { path: path.into(), source };
     let file = File::open(path).map_err(io)?;
     let found = file.metadata().map_err(io)?;
@@ -78,14 +112,19 @@ pub fn read(path: &Path) -> Result<Picture, ReadError> {
     let length = usize::try_from(found.len()).unwrap_or(usize::MAX);
     let mut reader = BufReader::new(file);
     let head = reader.fill_buf().map_err(io)?;
-    let picture = if head.starts_with(&::exr::meta::magic_number::BYTES) {
-        exr::read(reader, length)
+    let contents = if head.starts_with(&::exr::meta::magic_number::BYTES) {
+        exr::read(reader, length, path.parent().unwrap_or(Path::new("")))
     } else if head.starts_with(b"\x89PNG\r\n\x1a\n") {
-        png::read(reader, length)
+        png::read(reader, length).map(|(picture, float)| Contents {
+            picture,
+            float,
+            attributes: None,
+            pixel_hash: None,
+        })
     } else {
         return Err(ReadError::Unknown { path: path.into() });
     };
-    picture.map_err(|fault| match fault {
+    contents.map_err(|fault| match fault {
         Fault::Io(source) => ReadError::Io { path: path.into(), source },
         Fault::Damaged(reason) => ReadError::Damaged { path: path.into(), reason },
         Fault::Unsupported(reason) => ReadError::Unsupported { path: path.into(), reason },

@@ -23,7 +23,8 @@ impl From<DecodingError> for Fault {
     }
 }
 
-pub(super) fn read(reader: impl BufRead + Seek, length: usize) -> Result<Picture, Fault> {
+/// The picture, and whether its samples have more than eight bits.
+pub(super) fn read(reader: impl BufRead + Seek, length: usize) -> Result<(Picture, bool), Fault> {
     let mut decoder = Decoder::new(reader);
     decoder.set_transformations(Transformations::EXPAND);
     let mut reader = decoder.read_info()?;
@@ -40,7 +41,8 @@ pub(super) fn read(reader: impl BufRead + Seek, length: usize) -> Result<Picture
         _ => linear::<1>(&samples, color, |[code]| srgb::from_u8(code), 255.0),
     };
     let display = (width, height);
-    Ok(Picture { pixels, ..Picture::new(display, Window::full(display)) })
+    let picture = Picture { pixels, ..Picture::new(display, Window::full(display)) };
+    Ok((picture, depth == BitDepth::Sixteen))
 }
 
 /// Codes to linear light, alpha multiplied in. `BYTES` a sample, the most significant first.
