@@ -517,3 +517,41 @@ fn a_png_is_the_same_by_way_of_an_exr() {
     let (direct, half) = (codes("direct.png"), codes("half.png"));
     assert!(direct.iter().zip(&half).all(|(a, b)| a.abs_diff(*b) <= 1));
 }
+
+#[test]
+fn crops_merge_to_the_bytes_of_the_whole() {
+    let room = Room::new();
+    for options in ["", "--float --compression zip"] {
+        room.texts(&format!("render scene.toml -q --no-date -o whole.exr {options}"), 0);
+        // One part with a date: what differs from run to run is left out of the joined file.
+        room.texts("render scene.toml -q -o a.exr --crop 0,0,20,32 --float", 0);
+        room.texts("render scene.toml -q --no-date -o b.exr --crop 18,0,48,32 --float -t 1", 0);
+        if options.is_empty() {
+            room.texts("convert a.exr half.exr", 0);
+            fs::rename(room.path("half.exr"), room.path("a.exr")).unwrap();
+            room.texts("render scene.toml -q --no-date -o b.exr --crop 18,0,48,32", 0);
+        }
+        room.texts(&format!("merge a.exr b.exr -q -o full.exr {options}"), 0);
+        assert!(fs::read(room.path("full.exr")).unwrap() == fs::read(room.path("whole.exr")).unwrap(), "{options}");
+    }
+    let (_, err) = room.texts("merge a.exr -q -o x.exr", 3);
+    assert!(err.contains("the pixel 20,0 is in none of the parts"), "{err}");
+    room.texts("render scene.toml -q -o other.exr --crop 20,0,48,32 --seed 7 --float", 0);
+    let (_, err) = room.texts("merge a.exr other.exr -q -o x.exr", 3);
+    assert!(err.contains("other.exr: its render/sceneHash is"), "{err}");
+    assert!(!room.outputs().contains(&"x.exr".to_owned()));
+}
+
+#[test]
+fn exr_options_are_for_exr_and_colour_is_of_two_kinds() {
+    let room = Room::new();
+    room.texts("render scene.toml -q -o a.exr --float --color acescg --color never --compression piz", 0);
+    room.texts("render scene.toml -q -o b.exr --float", 0);
+    room.texts("compare a.exr b.exr --max-diff 1e-5", 0);
+    let (_, err) = room.texts("compare a.exr b.exr --color acescg", 2);
+    assert!(err.contains("about EXR files"), "{err}");
+    for option in ["--compression zip", "--multipart", "--depth-name Z", "--crypto-sidecar", "--color acescg"] {
+        let (_, err) = room.texts(&format!("render scene.toml -o a.png {option}"), 2);
+        assert!(err.contains("is for EXR"), "{err}");
+    }
+}

@@ -44,6 +44,12 @@ pub struct Threads {
 }
 
 impl Threads {
+    /// Gives the rest of the process as many: what packs pictures takes the threads that there are.
+    pub fn rule(self) {
+        // Only the first one who asks is heard, and that does no harm.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(self.count()).build_global();
+    }
+
     /// The number of threads; 0: one a core.
     pub fn count(self) -> usize {
         let slurm = || std::env::var("SLURM_CPUS_PER_TASK").ok()?.trim().parse::<u64>().ok();

@@ -6,7 +6,7 @@
 //!
 //! | file | what it is about |
 //! |---|---|
-//! | `render`, `info`, `check`, `compare`, `query`, `convert`, `manual` | one command each (`manual`: two) |
+//! | `render`, `info`, `check`, `compare`, `query`, `convert`, `merge`, `manual` | one command each (`manual`: two) |
 //! | `args`, `atoms`, `frames` | words that several commands understand |
 //! | `scene_file`, `pictures`, `hits` | files in and out |
 //! | `console`, `progress`, `stats_json` | what is said, to people and machines |
@@ -24,6 +24,7 @@ mod frames;
 mod hits;
 mod info;
 mod manual;
+mod merge;
 mod pictures;
 mod progress;
 mod query;
@@ -88,6 +89,8 @@ enum Command {
     Query(query::Args),
     /// Convert scenes to TOML, and pictures between EXR and PNG
     Convert(convert::Args),
+    /// Join crops of one frame to the frame
+    Merge(merge::Args),
     /// Print the completions of a shell
     Completions(manual::CompletionArgs),
     /// Print the manual page, or write the pages of all commands
@@ -179,7 +182,7 @@ pub fn run() -> ExitCode {
     };
     let (console, color_space) = (Console::new(cli.messages(), cli.quiet), cli.primaries());
     let run = Run { start, console, signals: Signals::watch(), color_space };
-    let writes_exr = matches!(cli.command, Command::Render(_) | Command::Convert(_));
+    let writes_exr = matches!(cli.command, Command::Render(_) | Command::Convert(_) | Command::Merge(_));
     if run.color_space.is_some() && !writes_exr {
         run.console.error("--color rec709 and acescg are about EXR files, and this command writes none");
         return ExitCode::from(Exit::Usage as u8);
@@ -191,6 +194,7 @@ pub fn run() -> ExitCode {
         Command::Compare(args) => compare::run(args, &run),
         Command::Query(args) => query::run(args, &run),
         Command::Convert(args) => convert::run(args, &run),
+        Command::Merge(args) => merge::run(args, &run),
         Command::Completions(args) => manual::completions(args, &run),
         Command::Man(args) => manual::man(args, &run),
     };

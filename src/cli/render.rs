@@ -111,6 +111,7 @@ impl From<IntegratorName> for Integrator {
 
 pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
     run.warn_of_build();
+    args.threads.rule();
     let list = args.frames.as_ref().map_or(&[1][..], |list| &list.0);
     let many = list.len() > 1;
     let name = args.output_name()?;
@@ -236,6 +237,7 @@ impl Args {
         let dated = !self.no_date && std::env::var_os("SOURCE_DATE_EPOCH").is_none();
         Description {
             scene: self.scene.file_name().map(|name| name.to_string_lossy().into_owned()),
+            scene_hash: Some(renderer.scene_hash()),
             camera: Some(renderer.view().clone()),
             spp: Some(renderer.image().spp),
             seed: Some(renderer.pattern()),

@@ -6,8 +6,10 @@
 
 mod channel;
 mod cryptomatte;
+mod join;
 mod picture;
 
 pub use self::channel::{Channel, Samples};
 pub use self::cryptomatte::Cryptomatte;
+pub use self::join::JoinError;
 pub use self::picture::{Picture, Window};

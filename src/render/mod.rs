@@ -239,6 +239,12 @@ impl<'s> Renderer<'s> {
         self.seed
     }
 
+    /// A hash of the scene and of all settings that decide about colour: equal hashes, equal pixels. In hexadecimal.
+    pub fn scene_hash(&self) -> String {
+        let settings = (self.image(), self.view(), self.depth(), self.pattern(), self.engine == Engine::Reference);
+        self.scene.hash(&format!("{settings:?}"))
+    }
+
     /// Renders the picture.
     pub fn render(&self, progress: &dyn Progress) -> Result<Rendering, RenderError> {
         self.checked_window()?;

@@ -14,6 +14,7 @@ pub mod cloud_file;
 pub mod error;
 mod fit;
 mod frames;
+mod hash;
 mod image;
 mod light;
 mod material;
