@@ -69,6 +69,15 @@ impl Counts {
         self
     }
 
+    /// What was added to an earlier state.
+    pub fn since(&self, before: &Counts) -> Self {
+        Counts {
+            boxes: self.boxes - before.boxes,
+            kinds: std::array::from_fn(|kind| self.kinds[kind] - before.kinds[kind]),
+            redecided: self.redecided - before.redecided,
+        }
+    }
+
     /// Sums up.
     pub fn add(&mut self, other: &Counts) {
         self.boxes += other.boxes;

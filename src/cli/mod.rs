@@ -23,9 +23,11 @@ mod exit;
 mod frames;
 mod hits;
 mod info;
+mod layers;
 mod manual;
 mod merge;
 mod pictures;
+mod preview;
 mod progress;
 mod query;
 mod render;
@@ -78,7 +80,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Render a scene to an EXR or PNG file
-    Render(render::Args),
+    Render(Box<render::Args>),
     /// Say what a scene holds and what it takes
     Info(info::Args),
     /// Check the engine against the f64 reference on a scene

@@ -115,6 +115,19 @@ impl Target {
         Ok(Target::File(path.into(), format))
     }
 
+    /// Whether it holds more than what a display shows.
+    pub fn is_exr(&self) -> bool {
+        self.format() == Format::Exr
+    }
+
+    /// The name of a file beside it: its own with another ending. None beside standard output.
+    pub fn beside(&self, ending: &str) -> Option<PathBuf> {
+        match self {
+            Target::File(path, _) => Some(path.with_extension(ending)),
+            Target::Stdout => None,
+        }
+    }
+
     fn format(&self) -> Format {
         match self {
             Target::File(_, format) => *format,

@@ -1,15 +1,17 @@
 //! `octray render`: a scene to a picture.
 
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Instant, SystemTime};
 
 use clap::ValueEnum;
 use clap::builder::PossibleValuesParser;
-use octray::film::Window;
-use octray::output::{Description, description};
+use octray::film::{Picture, Window};
+use octray::measure::heatmap;
+use octray::output::{Description, Options, description, png};
 use octray::plan::{Skip, SkipSet};
 use octray::render::{Engine, Stats};
-use octray::scene::{Frames, Integrator, particles};
+use octray::scene::{Aov, Frames, Integrator, Scene, particles};
 use octray::{Renderer, Rendering};
 
 use super::Run;
@@ -17,7 +19,9 @@ use super::args::{self, EngineName, StatsFile, Threads};
 use super::atoms::Atoms;
 use super::exit::{Exit, Failure};
 use super::frames::{self, FrameList};
+use super::layers::{LayerArgs, Windows};
 use super::pictures::{self, Depth, Target};
+use super::preview::{Preview, Tev};
 use super::progress::Bar;
 use super::stats_json::{self, Seconds};
 use super::{scene_file, system};
@@ -59,9 +63,13 @@ pub struct Args {
     /// Pixels of the whole picture [default: as in the scene]
     #[arg(long, value_name = "WxH", value_parser = args::resolution)]
     resolution: Option<(u32, u32)>,
-    /// Render only these pixels, the second corner excluded; they are the same as in the whole picture
-    #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = args::crop, allow_hyphen_values = true)]
-    crop: Option<Window>,
+    #[command(flatten)]
+    windows: Windows,
+    #[command(flatten)]
+    layers: LayerArgs,
+    /// Let rays that meet nothing be transparent: alpha 0, and no more pixels in an EXR than those that show something
+    #[arg(long, value_name = "KIND", value_parser = ["transparent"])]
+    background: Option<String>,
     /// Samples per pixel [default: as in the scene]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     spp: Option<u32>,
@@ -79,6 +87,9 @@ pub struct Args {
     /// Seed of the sample pattern [default: as in the scene]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     seed: Option<u64>,
+    /// Show the picture in the tev viewer while it is rendered, such as at 127.0.0.1:14158
+    #[arg(long, value_name = "HOST:PORT")]
+    tev: Option<String>,
     #[command(flatten)]
     stats: StatsFile,
     /// Do all the work, needed or not, or that of some kinds (as `octray info` names them): the same picture to the bit
@@ -158,12 +169,19 @@ fn render(args: &Args, scenes: &mut Frames, frame: i64, output: PathBuf, run: &R
     let loaded = scene_file::load(scenes, &args.scene, frame, run)?;
     let mut scene = loaded.scene;
     scene_file::resize(&mut scene, args.resolution);
+    if args.background.is_some() {
+        scene.background.transparent = true;
+    }
     if let Some(name) = args.integrator {
         scene.render.integrator = name.into();
     }
-    let renderer = args.renderer(&scene)?;
+    let next = args.next_frame(scenes, frame, &scene, run)?;
+    let mut renderer = args.renderer(&scene)?;
+    if let Some(next) = &next {
+        renderer = renderer.next_frame(next);
+    }
     let image = renderer.image();
-    let window = args.crop.unwrap_or(Window::full((image.width, image.height)));
+    let window = renderer.window()?;
     let work = format!("a picture of {}x{} pixels", window.width(), window.height());
     scene_file::need_memory(&scene, PIXEL_BYTES.saturating_mul(window.area() as u64), &work)?;
     if args.output.is_none() && args.out_dir.is_none() {
@@ -171,8 +189,13 @@ fn render(args: &Args, scenes: &mut Frames, frame: i64, output: PathBuf, run: &R
     }
 
     let bar = Bar::new(run, format!("{target}"));
-    let rendering = renderer.render(&bar)?;
-    drop(bar);
+    let write = |unfinished: &Rendering| args.write_unfinished(unfinished, &renderer, &target, options, frame, run);
+    let preview = Preview::new(run, bar, args.tev(&target, window, run), &write);
+    let mut rendering = renderer.render(&preview)?;
+    preview.finish();
+    if scene.background.transparent && !args.windows.is_crop() && target.is_exr() {
+        rendering.picture.trim();
+    }
     let stats = &rendering.stats;
     let writing = Instant::now();
     let picture = args.description(&renderer, stats, frame);
@@ -184,7 +207,8 @@ fn render(args: &Args, scenes: &mut Frames, frame: i64, output: PathBuf, run: &R
         trace: stats.trace_seconds,
         write: writing.elapsed().as_secs_f64(),
     };
-    args.write_stats(stats, &seconds, run)?;
+    args.write_stats(&rendering, &seconds, run)?;
+    args.write_cost(&rendering.picture, &target, run)?;
     run.console.note(&summary(&rendering, image.spp, &target, start));
     Ok(Exit::Done)
 }
@@ -199,14 +223,21 @@ impl Args {
         Ok(folder.join(name))
     }
 
-    fn renderer<'s>(&self, scene: &'s octray::Scene) -> Result<Renderer<'s>, Failure> {
+    /// The scene that motion leads to, where that is asked for and anything moves.
+    fn next_frame(&self, scenes: &mut Frames, frame: i64, now: &Scene, run: &Run) -> Result<Option<Scene>, Failure> {
+        if !self.layers.layers(now)?.has(Aov::Motion) {
+            return Ok(None);
+        }
+        let next = scenes.scene(frame + 1);
+        let told = |errors| run.console.warn(&format!("motion is 0: there is no frame {}: {errors}", frame + 1));
+        Ok(next.map_err(told).ok())
+    }
+
+    fn renderer<'s>(&self, scene: &'s Scene) -> Result<Renderer<'s>, Failure> {
         let mut renderer =
             Renderer::new(scene)?.threads(self.threads.count()).skips(self.skips()).engine(Engine::from(self.engine));
         if let Some(name) = &self.camera {
             renderer = renderer.camera(name)?;
-        }
-        if let Some(window) = self.crop {
-            renderer = renderer.crop(window);
         }
         if let Some(spp) = self.spp {
             renderer = renderer.spp(spp);
@@ -217,7 +248,7 @@ impl Args {
         if let Some(seed) = self.seed {
             renderer = renderer.seed(seed);
         }
-        Ok(renderer)
+        Ok(self.windows.apply(renderer).layers(self.layers.layers(scene)?))
     }
 
     /// What may be left out.
@@ -247,11 +278,56 @@ impl Args {
         }
     }
 
-    fn write_stats(&self, work: &Stats, seconds: &Seconds, run: &Run) -> Result<(), Failure> {
+    /// The viewer that the user asked for. A render goes on without one that does not answer.
+    fn tev(&self, target: &Target, window: Window, run: &Run) -> Option<Tev> {
+        let host = self.tev.as_deref()?;
+        let opened = Tev::open(host, &target.to_string(), window);
+        let told = |error: io::Error| run.console.warn(&format!("--tev {host}: {error}: rendering without a viewer"));
+        opened.map_err(told).ok()
+    }
+
+    /// Writes what there is so far beside the target, whose own name stays that of a whole picture.
+    fn write_unfinished(
+        &self,
+        unfinished: &Rendering,
+        renderer: &Renderer,
+        target: &Target,
+        options: Options,
+        frame: i64,
+        run: &Run,
+    ) {
+        let name = target.beside(if target.is_exr() { "partial.exr" } else { "partial.png" });
+        let name = name.unwrap_or_else(|| PathBuf::from("octray.partial.exr"));
+        let description = self.description(renderer, &unfinished.stats, frame);
+        let written = Target::new(&name, &[&self.scene], run)
+            .and_then(|target| pictures::write(&unfinished.picture, &target, options, &description, run));
+        match written {
+            Ok(()) => run.console.note(&format!("{}: the picture so far", name.display())),
+            Err(failure) => run.console.warn(&failure.message),
+        }
+    }
+
+    /// Draws the cost layer beside the picture.
+    fn write_cost(&self, picture: &Picture, target: &Target, run: &Run) -> Result<(), Failure> {
+        let Some(name) = target.beside("cost.png").filter(|_| self.layers.cost) else { return Ok(()) };
+        let tests = |name: &str| picture.channel(name).and_then(|channel| channel.samples.floats()).unwrap_or_default();
+        let pairs = tests("cost.box").iter().zip(tests("cost.prim"));
+        let values: Vec<f64> = pairs.map(|(boxes, prims)| f64::from(*boxes) + f64::from(*prims)).collect();
+        let map = heatmap::map_of(&values, picture.window).map_err(|error| Failure::new(Exit::Output, error))?;
+        let bytes = png::encode_raster(&map, "Box and primitive tests of each pixel")
+            .map_err(|error| Failure::new(Exit::Output, error))?;
+        pictures::write_bytes(&name, &bytes, run)?;
+        run.console.note(&format!("{}: box and primitive tests of each pixel", name.display()));
+        Ok(())
+    }
+
+    fn write_stats(&self, rendering: &Rendering, seconds: &Seconds, run: &Run) -> Result<(), Failure> {
         let Some(path) = &self.stats.stats else { return Ok(()) };
+        let work = &rendering.stats;
         let mut stats = stats_json::common(run, work.threads, seconds);
         stats_json::add_render(&mut stats, work, self.engine == EngineName::Reference);
         stats_json::add_memory(&mut stats, work.column_bytes, work.tree_bytes);
+        stats_json::add_names(&mut stats, &rendering.names);
         stats_json::write(path, stats, run)
     }
 }

@@ -4,6 +4,8 @@
 //! thread of its own, whatever the others are doing (loading, building, tracing), within a tenth of a
 //! second. A file that is being written is given up first, or finished where it is nearly done: it
 //! appears whole, or not at all. A second signal does not wait for that.
+//!
+//! SIGUSR1 asks a render to write what it has so far, and to go on.
 
 use std::process;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -27,6 +29,8 @@ pub struct Signals {
     caught: Arc<AtomicUsize>,
     /// Held while a file is written.
     writing: Arc<Mutex<()>>,
+    /// SIGUSR1 came: somebody wants to see how far it is.
+    asked: Arc<AtomicBool>,
     /// To be cleared before the last message.
     bar: Arc<OnceLock<ProgressBar>>,
 }
@@ -39,6 +43,8 @@ impl Signals {
         if thread::Builder::new().spawn(move || watch.wait()).is_err() {
             return signals;
         }
+        #[cfg(unix)]
+        let _ = flag::register(signal_hook::consts::SIGUSR1, Arc::clone(&signals.asked));
         let again = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM] {
             let number = usize::try_from(signal).unwrap_or_default();
@@ -64,6 +70,11 @@ impl Signals {
     /// Whether a signal came, and what takes long should be given up.
     pub fn is_caught(&self) -> bool {
         self.caught.load(Ordering::Relaxed) != 0
+    }
+
+    /// Whether SIGUSR1 came since the last time that this was asked.
+    pub fn is_asked(&self) -> bool {
+        self.asked.load(Ordering::Relaxed) && self.asked.swap(false, Ordering::Relaxed)
     }
 
     /// Has a progress bar cleared before a signal ends the process.

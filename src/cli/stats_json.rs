@@ -1,11 +1,12 @@
 //! `--stats FILE.json`: what a run did and what it took.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use octray::accel::Counts;
 use octray::integrate::RayKind;
 use octray::plan::Kind;
-use octray::render::Stats;
+use octray::render::{IdNames, Stats};
 use serde_json::{Map, Value, json};
 
 use super::console::pretty;
@@ -83,6 +84,16 @@ pub fn add_memory(stats: &mut Map<String, Value>, column_bytes: usize, tree_byte
     let peak = system::peak_bytes();
     let memory = json!({ "peak_bytes": peak, "column_bytes": column_bytes, "tree_bytes": tree_bytes });
     stats.insert("memory".to_owned(), memory);
+}
+
+/// What the numbers in the id channels stand for, where there are such channels.
+pub fn add_names(stats: &mut Map<String, Value>, names: &IdNames) {
+    let table = |names: &BTreeMap<u32, String>| -> Map<String, Value> {
+        names.iter().map(|(number, name)| (number.to_string(), json!(name))).collect()
+    };
+    if *names != IdNames::default() {
+        stats.insert("ids".to_owned(), json!({ "object": table(&names.object), "material": table(&names.material) }));
+    }
 }
 
 /// Writes them.

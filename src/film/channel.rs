@@ -36,6 +36,15 @@ impl Samples {
         self.len() == 0
     }
 
+    /// Some stretches of them, one after another.
+    pub fn rows(&self, rows: &[Range<usize>]) -> Samples {
+        match self {
+            Samples::Half(samples) => Samples::Half(pick(samples, rows)),
+            Samples::Float(samples) => Samples::Float(pick(samples, rows)),
+            Samples::Uint(samples) => Samples::Uint(pick(samples, rows)),
+        }
+    }
+
     /// Floats of either width; `None` for integers.
     pub fn floats(&self) -> Option<&[f32]> {
         match self {
@@ -53,12 +62,7 @@ impl Channel {
 
     /// Some stretches of the samples, one after another.
     pub(super) fn rows(&self, rows: &[Range<usize>]) -> Channel {
-        let samples = match &self.samples {
-            Samples::Half(samples) => Samples::Half(pick(samples, rows)),
-            Samples::Float(samples) => Samples::Float(pick(samples, rows)),
-            Samples::Uint(samples) => Samples::Uint(pick(samples, rows)),
-        };
-        Channel { name: self.name.clone(), samples }
+        Channel { name: self.name.clone(), samples: self.samples.rows(rows) }
     }
 }
 

@@ -42,7 +42,7 @@ impl Cryptomatte {
     }
 
     /// The same with only the names that its channels among `channels` still hold.
-    pub(super) fn present(&self, channels: &[Channel]) -> Cryptomatte {
+    pub fn present(&self, channels: &[Channel]) -> Cryptomatte {
         let ids = |channel: &&Channel| channel.name.ends_with(".R") || channel.name.ends_with(".B");
         let seen: HashSet<u32> = channels
             .iter()

@@ -24,6 +24,13 @@ impl Window {
         Window { x0: 0, y0: 0, x1: edge(display.0), y1: edge(display.1) }
     }
 
+    /// With so many pixels more on the left and right side, and so many above and below.
+    pub fn grown(&self, [x, y]: [u32; 2]) -> Window {
+        let less = |edge: i32, by: u32| edge.saturating_sub_unsigned(by);
+        let more = |edge: i32, by: u32| edge.saturating_add_unsigned(by);
+        Window { x0: less(self.x0, x), y0: less(self.y0, y), x1: more(self.x1, x), y1: more(self.y1, y) }
+    }
+
     /// Pixels from left to right.
     pub fn width(&self) -> usize {
         extent(self.x0, self.x1)
@@ -112,6 +119,27 @@ impl Picture {
         area > 0 && self.pixels.len() == area && self.channels.iter().all(|channel| channel.samples.len() == area)
     }
 
+    /// The smallest window that holds every pixel that is not wholly transparent, and at least one pixel.
+    pub fn seen(&self) -> Window {
+        let start = Window { x1: self.window.x0 + 1, y1: self.window.y0 + 1, ..self.window };
+        let places = self.pixels.iter().enumerate().filter(|(_, pixel)| **pixel != [0.0; 4]);
+        let grown = |seen: Option<Window>, (x, y): (i32, i32)| {
+            let Window { x0, y0, x1, y1 } = seen.unwrap_or(Window { x0: x, y0: y, x1: x + 1, y1: y + 1 });
+            Some(Window { x0: x0.min(x), y0: y0.min(y), x1: x1.max(x + 1), y1: y1.max(y + 1) })
+        };
+        places.map(|(index, _)| self.window.pixel(index)).fold(None, grown).unwrap_or(start)
+    }
+
+    /// Leaves out rows and columns at the edges that are wholly transparent.
+    pub fn trim(&mut self) {
+        let window = self.seen();
+        if window != self.window
+            && let Some(part) = self.crop(window)
+        {
+            *self = part;
+        }
+    }
+
     /// The part of the picture that lies in `window`; the frame stays the same, and manifests keep the names
     /// that are left. `None` where the window is empty or reaches beyond the picture's own.
     pub fn crop(&self, window: Window) -> Option<Picture> {
@@ -165,6 +193,17 @@ mod tests {
         assert_eq!(part.get(1, 1), None);
         assert_eq!(picture.crop(Window { x0: 2, y0: 1, x1: 7, y1: 3 }), None);
         assert_eq!(picture.crop(Window { x0: 2, y0: 1, x1: 2, y1: 3 }), None);
+    }
+
+    #[test]
+    fn what_is_seen_has_the_smallest_window() {
+        let mut picture = Picture::new((6, 4), Window { x0: -1, y0: -1, x1: 7, y1: 5 });
+        assert_eq!(picture.seen(), Window { x0: -1, y0: -1, x1: 0, y1: 0 });
+        for (x, y) in [(2, 0), (4, 3)] {
+            let index = picture.window.index(x, y).unwrap();
+            picture.pixels[index][3] = 0.25;
+        }
+        assert_eq!(picture.seen(), Window { x0: 2, y0: 0, x1: 5, y1: 4 });
     }
 
     #[test]

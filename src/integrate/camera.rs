@@ -75,7 +75,12 @@ impl CameraRays {
     /// Eight rays in f64.
     #[inline(always)]
     pub fn exact(&self, samples: &Samples8) -> ExactPacket {
-        let points = self.points(samples);
+        self.exact_at(samples, &self.points(samples))
+    }
+
+    /// Eight rays in f64, through the [points](CameraRays::points) of their samples.
+    #[inline(always)]
+    pub fn exact_at(&self, samples: &Samples8, points: &[[f64; LANES]; 2]) -> ExactPacket {
         let at = |base: &[DVec3; 3], k: usize| {
             let mut axis = [0.0; LANES];
             for lane in 0..LANES {
@@ -88,7 +93,7 @@ impl CameraRays {
         match &self.optics {
             Optics::Straight => {}
             Optics::Lens(radii, focus) => rays.through_lens(samples, radii, *focus),
-            Optics::Round(axes, turns) => rays.around(&points, axes, *turns),
+            Optics::Round(axes, turns) => rays.around(points, axes, *turns),
         }
         rays
     }
@@ -106,7 +111,7 @@ impl CameraRays {
 
     /// Points of the picture in pixels: x, y.
     #[inline(always)]
-    fn points(&self, samples: &Samples8) -> [[f64; LANES]; 2] {
+    pub fn points(&self, samples: &Samples8) -> [[f64; LANES]; 2] {
         let mut points = [samples.x, samples.y].map(|axis| axis.map(|pixel| f64::from(pixel) + 0.5));
         if self.centered {
             return points;
@@ -145,6 +150,16 @@ pub struct Samples8 {
 }
 
 impl Samples8 {
+    /// Squares of the distances of points of the picture from the centres of their pixels.
+    #[inline(always)]
+    pub fn distances(&self, points: &[[f64; LANES]; 2]) -> [f64; LANES] {
+        let off = |axis: &[f64; LANES], pixels: &[i32; LANES], i: usize| axis[i] - (f64::from(pixels[i]) + 0.5);
+        std::array::from_fn(|i| {
+            let (dx, dy) = (off(&points[0], &self.x, i), off(&points[1], &self.y, i));
+            dx * dx + dy * dy
+        })
+    }
+
     /// Sets one sample: its pixel, that one's pattern, and its index.
     #[inline(always)]
     pub fn set(&mut self, lane: usize, (x, y): (i32, i32), pattern: PixelPattern, index: u32) {

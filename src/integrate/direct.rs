@@ -158,6 +158,7 @@ impl<'s> Direct<'s> {
             let hit = live & wave.tile.met(p).bits();
             rays.rays[kind] += u64::from(live.count_ones());
             rays.hits[kind] += u64::from(hit.count_ones());
+            rays.packets[kind] += 1;
             if R::ON {
                 self.tell(wave, p, live, record);
             }

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::direct::Direct;
-use super::record::Record;
+use super::record::{Record, Seen};
 use super::wave::Wave;
 use crate::lanes::{Float8, LANES, Mask8, UNIT_ROUNDOFF, Vec3x8, bits, float8};
 use crate::plan::{Owner, Skip};
@@ -76,6 +76,11 @@ impl Direct<'_> {
         }
         if self.plan.smooth || all {
             self.add_normals(&owners, shaded, &mut exact[first..]);
+        }
+        if R::SURFACES && wave.depth == 1 {
+            let (rows, owners, materials) = (wave.tile.hits[p], &owners, &materials);
+            let (normal, bsdf) = (shaded.n_s, &shaded.bsdf);
+            record.surface(&Seen { packet: p, hit, rays, rows, owners, materials, normal, bsdf });
         }
     }
 

@@ -103,6 +103,7 @@ impl Direct<'_> {
             let bright = cast & tile.packets[p].live().bits();
             sink.rays.rays[RayKind::Shadow as usize] += u64::from(cast.count_ones());
             sink.rays.hits[RayKind::Shadow as usize] += u64::from((cast & !bright).count_ones());
+            sink.rays.packets[RayKind::Shadow as usize] += u64::from(cast != 0);
             if let Some(packets) = &told {
                 for i in bits(*lit) {
                     let dark = bright >> i & 1 == 0;

@@ -1,6 +1,11 @@
 //! What is counted of rays, and who may look on.
 
-use crate::lanes::Ray;
+use super::camera::Samples8;
+use super::direct::Samples;
+use crate::accel::{Counts, PACKETS};
+use crate::lanes::{Float8, LANES, Ray, RayPacket, Vec3x8};
+use crate::plan::Owner;
+use crate::shade::Bsdf8;
 
 /// Why a ray was traced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -39,15 +44,31 @@ pub struct RayCounts {
     pub hits: [u64; RayKind::ALL.len()],
     /// (Ray, primitive) pairs decided again in f64.
     pub redecided: [u64; RayKind::ALL.len()],
+    /// Packets that the rays were in.
+    pub packets: [u64; RayKind::ALL.len()],
 }
 
 impl RayCounts {
+    /// What was added to an earlier state.
+    pub fn since(&self, before: &RayCounts) -> Self {
+        let rest = |now: &[u64; RayKind::ALL.len()], before: &[u64; RayKind::ALL.len()]| {
+            std::array::from_fn(|kind| now[kind] - before[kind])
+        };
+        RayCounts {
+            rays: rest(&self.rays, &before.rays),
+            hits: rest(&self.hits, &before.hits),
+            redecided: rest(&self.redecided, &before.redecided),
+            packets: rest(&self.packets, &before.packets),
+        }
+    }
+
     /// Sums up.
     pub fn add(&mut self, other: &RayCounts) {
         for kind in RayKind::ALL {
             self.rays[kind as usize] += other.rays[kind as usize];
             self.hits[kind as usize] += other.hits[kind as usize];
             self.redecided[kind as usize] += other.redecided[kind as usize];
+            self.packets[kind as usize] += other.packets[kind as usize];
         }
     }
 }
@@ -67,6 +88,64 @@ pub trait Record {
     fn lit(&mut self, light: usize, slot: usize, path: u32);
     /// A surface took its colour from a cell of a texture.
     fn texture(&mut self, texture: usize, cell: i64, slot: usize, path: u32);
+
+    /// Whether what camera rays see is to be told, and what came of each tile.
+    const SURFACES: bool = false;
+    /// Camera rays of one packet met surfaces.
+    fn surface(&mut self, _: &Seen) {}
+    /// The camera rays of a tile met all that they meet.
+    fn taken(&mut self, _: &Taken) {}
+    /// All that goes on from some tiles is known.
+    fn summed(&mut self, _: &Summed) {}
+}
+
+/// What the camera rays of a packet met. Lanes that are not in `hit` mean nothing.
+#[derive(Debug, Clone, Copy)]
+pub struct Seen<'a> {
+    /// Its place in the tile.
+    pub packet: usize,
+    /// Lanes that met something.
+    pub hit: u32,
+    /// The rays, ending where they met it.
+    pub rays: &'a RayPacket,
+    /// What they met: bits of a [`RowRef`](crate::shapes::RowRef).
+    pub rows: Float8,
+    /// Whose that is.
+    pub owners: &'a [Owner; LANES],
+    /// Materials of the sides that are seen.
+    pub materials: &'a [u32; LANES],
+    /// Shading normals on the viewer's side, unit.
+    pub normal: Vec3x8,
+    /// The materials' numbers.
+    pub bsdf: &'a Bsdf8,
+}
+
+/// The samples of a tile of camera rays.
+#[derive(Debug, Clone, Copy)]
+pub struct Taken<'a> {
+    /// How many there are; they fill packet after packet.
+    pub count: usize,
+    /// The samples.
+    pub samples: &'a [Samples8; PACKETS],
+    /// The pixel of each in the block's row-by-row list, by packet.
+    pub pixels: &'a [[u32; LANES]],
+    /// Squares of their distances from the centres of their pixels, pixels.
+    pub distances: &'a [[f64; LANES]; PACKETS],
+}
+
+/// Samples of some tiles and what came of them.
+#[derive(Debug, Clone, Copy)]
+pub struct Summed<'a> {
+    /// How many there are; they fill packet after packet.
+    pub count: usize,
+    /// The pixel of each in the block's row-by-row list, by packet.
+    pub pixels: &'a [[u32; LANES]],
+    /// Radiance and alpha.
+    pub samples: &'a Samples,
+    /// Tests done for them.
+    pub tests: Counts,
+    /// Rays traced for them, and packets.
+    pub rays: RayCounts,
 }
 
 /// Nobody looks on.

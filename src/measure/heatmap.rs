@@ -2,7 +2,7 @@
 
 use super::canvas;
 use super::metrics::{CompareError, pixel_difference, same_size};
-use crate::film::Picture;
+use crate::film::{Picture, Window};
 use crate::output::png::Raster;
 
 /// Decades from the lower to the upper end of the scale.
@@ -48,13 +48,24 @@ const VIRIDIS: [[u8; 3]; 17] = [
 pub fn heatmap(a: &Picture, b: &Picture) -> Result<Raster, CompareError> {
     same_size(a, b)?;
     let differences: Vec<f64> = a.pixels.iter().zip(&b.pixels).map(|(a, b)| pixel_difference(a, b)).collect();
-    let largest = differences.iter().copied().filter(|value| value.is_finite()).fold(0.0, f64::max);
+    map_of(&differences, a.window)
+}
+
+/// Values of the pixels of a window, row by row, none of them negative, on the same scale; black means 0.
+///
+/// # Errors
+/// The window is empty, or not as large as there are values.
+pub fn map_of(values: &[f64], window: Window) -> Result<Raster, CompareError> {
+    if window.area() == 0 || values.len() != window.area() {
+        return Err(CompareError::Empty);
+    }
+    let largest = values.iter().copied().filter(|value| value.is_finite()).fold(0.0, f64::max);
     let top = if largest > 0.0 { largest.log10().ceil() as i32 } else { 0 };
-    let (width, height) = (a.window.width(), a.window.height());
+    let (width, height) = (window.width(), window.height());
     let bar = Bar::new(width);
     let mut raster = empty(width.max(bar.width), height + bar.height)?;
     let columns = raster.width as usize;
-    for (row, values) in raster.pixels.chunks_exact_mut(columns).zip(differences.chunks_exact(width)) {
+    for (row, values) in raster.pixels.chunks_exact_mut(columns).zip(values.chunks_exact(width)) {
         for (pixel, &value) in row.iter_mut().zip(values) {
             *pixel = color(value, top);
         }

@@ -16,7 +16,7 @@ use self::needs::Needs;
 pub use self::parts::{
     BoxPart, ConePart, CylinderPart, DiskPart, Kind, Owner, Parts, PlanePart, PolygonPart, SpherePart, TurnedBoxPart,
 };
-use crate::scene::{Material, Scene, Visible};
+use crate::scene::{Aov, Layers, Material, Scene, Visible};
 
 /// Decisions about one scene seen from one origin.
 #[derive(Debug)]
@@ -69,7 +69,17 @@ impl<'s> Plan<'s> {
         let goes_on = sides.iter().map(goes_on).collect();
         let textured = needs.textures.contains(&true);
         let Needs { colored, smooth, shines, scatters, .. } = needs;
-        Plan { scene, origin, visible, sides, colored, smooth, textured, shines, scatters, goes_on, lights, skips }
+        let mut plan =
+            Plan { scene, origin, visible, sides, colored, smooth, textured, shines, scatters, goes_on, lights, skips };
+        plan.leave_out_layers(scene.layers);
+        plan
+    }
+
+    /// Leaves out the layers that are not among those asked for, in place of the scene's.
+    pub fn leave_out_layers(&mut self, asked: Layers) {
+        let unasked: Vec<&str> = Aov::ALL.into_iter().filter(|aov| !asked.has(*aov)).map(Aov::name).collect();
+        let why = || format!("nobody asked for {}", unasked.join(", "));
+        self.skips.decide(Skip::Layers, unasked.len() as u64, (!unasked.is_empty()).then(why));
     }
 
     /// All parts of the scene, relative to the origin.

@@ -20,15 +20,18 @@ pub enum Skip {
     Shading,
     /// Textures that no primitive shows.
     Textures,
+    /// Layers beside the colour that nobody asked for.
+    Layers,
 }
 
 /// Each kind with its name, and the word for what is counted of it; none where nothing is.
-const ROWS: [(Skip, &str, Option<&str>); 5] = [
+const ROWS: [(Skip, &str, Option<&str>); 6] = [
     (Skip::Lights, "lights", Some("lights")),
     (Skip::Shadows, "shadows", Some("shadow rays")),
     (Skip::Bounces, "bounces", None),
     (Skip::Shading, "shading", None),
     (Skip::Textures, "textures", Some("textures")),
+    (Skip::Layers, "layers", Some("layers")),
 ];
 
 impl Skip {
@@ -98,6 +101,7 @@ impl Skips {
 
     /// Leaves out a kind of work if there is a reason and the user allows it; `count` of it are so at once.
     pub fn decide(&mut self, skip: Skip, count: u64, why: Option<String>) {
+        self.left_out &= !(1 << skip as u32);
         if let Some(why) = why.filter(|_| self.allowed.has(skip)) {
             self.left_out |= 1 << skip as u32;
             self.why[skip as usize] = why;

@@ -58,6 +58,26 @@ impl View {
         (center_x + self.filter.offset(a), center_y + self.filter.offset(b))
     }
 
+    /// The square of the distance between the point of a sample and the centre of its pixel, in pixels.
+    pub fn distance(&self, x: i32, y: i32, sample: u32) -> f64 {
+        let (px, py) = self.point(x, y, sample);
+        let (dx, dy) = (px - (f64::from(x) + 0.5), py - (f64::from(y) + 0.5));
+        dx * dx + dy * dy
+    }
+
+    /// How far a length of a direction leads along the view axis; in a panorama, away from the eye.
+    pub fn depth_scale(&self, dir: DVec3) -> f64 {
+        match self.lens {
+            Lens::Pinhole { .. } | Lens::Orthographic { .. } | Lens::ThinLens { .. } => dir.dot(self.forward),
+            Lens::Panoramic => dir.length(),
+        }
+    }
+
+    /// Samples per pixel.
+    pub fn samples(&self) -> u32 {
+        self.spp
+    }
+
     /// The camera ray of a sample of a pixel.
     pub fn sample(&self, x: i32, y: i32, sample: u32) -> Ray {
         let (px, py) = self.point(x, y, sample);

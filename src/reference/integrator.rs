@@ -3,10 +3,10 @@
 //! Source: Whitted, "An improved illumination model for shaded display", Communications of the ACM
 //! 23(6), 1980; what each material and light contributes is said in their doc comments.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::light::arrive;
-use super::material::{Onward, Side, albedo, onward};
+use super::material::{Onward, Side, albedo, onward, reflectance};
 use super::{Hit, Ray, Reference, View, background, texture};
 use crate::scene::{Light, Model, Paint};
 
@@ -19,6 +19,38 @@ pub struct Pixel {
     pub events: Vec<Event>,
     /// How many rays were traced.
     pub rays: RayCounts,
+    /// What each sample saw, by its index.
+    pub samples: Vec<CameraSample>,
+}
+
+/// One sample of a pixel: what layers beside the colour are made of.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct CameraSample {
+    /// Square of its distance from the pixel's centre, pixels.
+    pub distance: f64,
+    /// Linear Rec. 709.
+    pub radiance: DVec3,
+    /// What its camera ray met.
+    pub first: Option<First>,
+}
+
+/// What a camera ray met.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct First {
+    /// Index of the primitive.
+    pub primitive: usize,
+    /// Index of the material of the side that is seen.
+    pub material: usize,
+    /// On the surface, relative to the origin of the tracer.
+    pub point: DVec3,
+    /// Along the view axis.
+    pub depth: f64,
+    /// Shading normal on the side that is seen, unit.
+    pub normal: DVec3,
+    /// Reflectance, 0 to 1.
+    pub albedo: DVec3,
+    /// As the shape's doc comment says.
+    pub uv: DVec2,
 }
 
 /// Rays by kind.
@@ -83,8 +115,11 @@ impl Reference {
     pub fn pixel(&self, view: &View, x: i32, y: i32) -> Pixel {
         let mut pixel = Pixel::default();
         for sample in 0..view.spp {
-            let mut walk = Walk { tracer: self, sample, max_depth: view.max_depth, pixel: &mut pixel };
+            let distance = view.distance(x, y, sample);
+            pixel.samples.push(CameraSample { distance, ..CameraSample::default() });
+            let mut walk = Walk { tracer: self, view, sample, max_depth: view.max_depth, pixel: &mut pixel };
             let (radiance, alpha) = walk.radiance(view.sample(x, y, sample));
+            pixel.samples[sample as usize].radiance = radiance;
             for (sum, value) in pixel.rgba.iter_mut().zip([radiance.x, radiance.y, radiance.z, alpha]) {
                 *sum += value;
             }
@@ -97,6 +132,7 @@ impl Reference {
 /// One sample of a pixel in the making.
 struct Walk<'a> {
     tracer: &'a Reference,
+    view: &'a View,
     sample: u32,
     max_depth: u32,
     pixel: &'a mut Pixel,
@@ -150,6 +186,17 @@ impl Walk<'_> {
         let color = self.color(step, hit, &material.model);
         let turn = if hit.front { 1.0 } else { -1.0 };
         let side = Side { n: turn * hit.shading_normal, n_g: turn * hit.normal, dir: step.ray.dir };
+        if step.depth == 1 {
+            self.pixel.samples[self.sample as usize].first = Some(First {
+                primitive: hit.primitive,
+                material: hit.material,
+                point: hit.point,
+                depth: hit.t * self.view.depth_scale(step.ray.dir),
+                normal: side.n,
+                albedo: reflectance(&material.model, color),
+                uv: hit.uv,
+            });
+        }
         let Onward { reflected, refracted } = onward(&material.model, color, &side, hit.front);
         let mut go_on = |kind, path: u32, weight: DVec3, dir| {
             let ray = Ray { origin: hit.spawn(dir), dir, t_min: 0.0, t_max: f64::INFINITY };

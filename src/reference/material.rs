@@ -93,6 +93,15 @@ pub fn albedo(model: &Model, color: DVec3) -> DVec3 {
     }
 }
 
+/// The share of light that comes back, by channel: what the albedo layer holds.
+pub fn reflectance(model: &Model, color: DVec3) -> DVec3 {
+    let all = match *model {
+        Model::Diffuse { .. } | Model::Mirror { .. } | Model::Dielectric { .. } => color,
+        Model::Phong { kd, ks, .. } => kd * color + DVec3::splat(ks),
+    };
+    all.clamp(DVec3::ZERO, DVec3::ONE)
+}
+
 /// What becomes of the radiance along the two rays that go on from a hit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Onward {

@@ -45,7 +45,7 @@ use self::line::{Line, Root};
 use crate::scene::{Background, Light, Material, Scene, Texture, Visible};
 
 pub use self::camera::View;
-pub use self::integrator::{Event, EventKind, Pixel, RayCounts};
+pub use self::integrator::{CameraSample, Event, EventKind, First, Pixel, RayCounts};
 pub use self::margin::{TOLERANCE, U, Verdict};
 
 /// A scene ready to be traced.

@@ -2,10 +2,11 @@
 
 use std::ops::Range;
 
+use super::layers::LayerWork;
 use crate::accel::{Counts, PACKETS};
 use crate::film::{Picture, Window};
 use crate::integrate::{
-    CameraRays, Direct, PixelPattern, RayCounts, RayKind, Record, Room, Samples, Samples8, WAVE, Wave,
+    CameraRays, Direct, PixelPattern, RayCounts, RayKind, Record, Room, Samples, Samples8, Summed, Taken, WAVE, Wave,
 };
 use crate::lanes::LANES;
 use crate::plan::LeftOut;
@@ -24,6 +25,8 @@ pub struct Block {
 pub struct BlockWork {
     /// Row by row.
     pub pixels: Vec<[f32; 4]>,
+    /// Layers beside the colour, where any are asked for.
+    pub layers: Option<LayerWork>,
     pub rays: RayCounts,
     pub tests: Counts,
     pub left_out: LeftOut,
@@ -52,12 +55,20 @@ impl Block {
         starts(window.y0, window.y1).flat_map(row).collect()
     }
 
+    /// The whole square of the grid that it is a part of.
+    pub fn whole(&self) -> Block {
+        let (x0, y0) = (self.window.x0.div_euclid(EDGE) * EDGE, self.window.y0.div_euclid(EDGE) * EDGE);
+        Block::new(Window { x0, y0, x1: x0 + EDGE, y1: y0 + EDGE })
+    }
+
     /// All samples of all pixels: pixels along a Z curve, the samples of one after another, 64 at a time.
     /// So a tile is as square as the number of samples allows, and each pixel sums in sample order.
     pub fn trace<R: Record>(&self, rays: &CameraRays, direct: &Direct, spp: u32, record: &mut R) -> BlockWork {
         let window = self.window;
         let sums = vec![[0f64; 4]; window.area()];
-        let mut work = Work { rays, direct, record, sums, room: Room::default(), tiles: 0, background_tiles: 0 };
+        let before = (Counts::default(), RayCounts::default());
+        let room = Room::default();
+        let mut work = Work { rays, direct, record, sums, room, before, tiles: 0, background_tiles: 0 };
         let mut batch = Batch::default();
         for code in 0..(EDGE * EDGE) as u32 {
             let (x, y) = (window.x0 + compact(code), window.y0 + compact(code >> 1));
@@ -77,7 +88,17 @@ impl Block {
         let pixels = work.sums.into_iter().map(|sum| sum.map(|x| (x * share) as f32)).collect();
         let (tiles, background_tiles) = (work.tiles, work.background_tiles);
         let Room { walk, rays, left_out, .. } = work.room;
-        BlockWork { pixels, rays, tests: walk.counts, left_out, tiles, background_tiles }
+        BlockWork { pixels, layers: None, rays, tests: walk.counts, left_out, tiles, background_tiles }
+    }
+
+    /// The part of a block's pixels and layers that lies in this one.
+    pub fn cut(&self, whole: &Block, work: &mut BlockWork) {
+        let row = |y| whole.window.index(self.window.x0, y).map(|start| start..start + self.window.width());
+        let rows: Vec<_> = (self.window.y0..self.window.y1).filter_map(row).collect();
+        work.pixels = rows.iter().flat_map(|row| &work.pixels[row.clone()]).copied().collect();
+        if let Some(layers) = &mut work.layers {
+            layers.channels.iter_mut().for_each(|samples| *samples = samples.rows(&rows));
+        }
     }
 
     /// Puts the pixels where they belong.
@@ -97,6 +118,8 @@ struct Work<'a, 's, R: Record> {
     record: &'a mut R,
     sums: Vec<[f64; 4]>,
     room: Room,
+    /// Tests and rays that a record was told of already.
+    before: (Counts, RayCounts),
     tiles: u64,
     background_tiles: u64,
 }
@@ -109,6 +132,8 @@ struct Batch {
     pixels: Vec<[u32; LANES]>,
     /// Samples with a tile of their own already.
     traced: usize,
+    /// Squares of the waiting samples' distances from the centres of their pixels, where a record wants them.
+    distances: [[f64; LANES]; PACKETS],
 }
 
 impl<R: Record> Work<'_, '_, R> {
@@ -121,8 +146,12 @@ impl<R: Record> Work<'_, '_, R> {
             self.record.tile(batch.traced, &mut batch.samples());
         }
         let met = self.room.rays.hits[RayKind::Camera as usize];
-        batch.fill(self.room.camera_wave(self.rays.common_origin()), self.rays, self.direct.goes_on());
+        batch.fill::<R>(self.room.camera_wave(self.rays.common_origin()), self.rays, self.direct.goes_on());
         self.direct.trace_camera(&mut self.room, self.record);
+        if R::SURFACES {
+            let Batch { samples, count, pixels, traced, distances } = &*batch;
+            self.record.taken(&Taken { count: *count, samples, pixels: &pixels[traced / LANES..], distances });
+        }
         self.tiles += 1;
         self.background_tiles += u64::from(self.room.rays.hits[RayKind::Camera as usize] == met);
         batch.traced += batch.count;
@@ -138,6 +167,13 @@ impl<R: Record> Work<'_, '_, R> {
             self.direct.trace_later(&mut self.room, self.record);
         }
         batch.add_to(&self.room.samples, &mut self.sums);
+        if R::SURFACES {
+            let (now, before) = ((self.room.walk.counts, self.room.rays), self.before);
+            let (tests, rays) = (now.0.since(&before.0), now.1.since(&before.1));
+            let (count, pixels, samples) = (batch.traced, &batch.pixels[..], &self.room.samples);
+            self.record.summed(&Summed { count, pixels, samples, tests, rays });
+            self.before = now;
+        }
         self.room.begin();
         (batch.traced, batch.count) = (0, 0);
         batch.pixels.clear();
@@ -167,10 +203,15 @@ impl Batch {
         (0..self.count).map(lane).map(|(samples, i)| (samples.x[i], samples.y[i], samples.index[i]))
     }
 
-    fn fill(&self, wave: &mut Wave, rays: &CameraRays, keep_exact: bool) {
-        let count = |p: usize| self.count.saturating_sub(p * LANES).min(LANES);
+    fn fill<R: Record>(&mut self, wave: &mut Wave, rays: &CameraRays, keep_exact: bool) {
+        let all = self.count;
+        let count = |p: usize| all.saturating_sub(p * LANES).min(LANES);
         for (p, samples) in self.samples.iter().enumerate() {
-            let exact = rays.exact(samples);
+            let points = rays.points(samples);
+            let exact = rays.exact_at(samples, &points);
+            if R::SURFACES {
+                self.distances[p] = samples.distances(&points);
+            }
             wave.tile.packets[p] = rays.packet(&exact, count(p));
             if keep_exact {
                 wave.exact[p] = exact;

@@ -1,6 +1,7 @@
 //! A frame: tiles over the cores, cancellation, statistics.
 
 mod block;
+mod layers;
 mod query;
 mod reference;
 mod stats;
@@ -14,6 +15,7 @@ use glam::DVec3;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
+pub use self::layers::IdNames;
 pub use self::query::{Answers, Batch, Query};
 pub use self::stats::Stats;
 pub use self::task::{Task, Traced};
@@ -24,7 +26,7 @@ use crate::film::{Picture, Window};
 use crate::integrate::{CameraRays, Direct, RayCounts, Record};
 use crate::output::{self, Description, Losses, Options, OutputError};
 use crate::plan::{InvalidScene, Plan, SkipSet, validate};
-use crate::scene::{Camera, ImageSettings, Scene};
+use crate::scene::{Camera, ImageSettings, Layers, Scene};
 
 /// Which tracer finds the hits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -42,6 +44,8 @@ pub enum Engine {
 pub trait Progress: Sync {
     /// `done` of `total` samples are finished.
     fn advance(&self, done: u64, total: u64);
+    /// A block is done; [`Task::finish`] makes a picture of all those so far.
+    fn block(&self, _task: &Task, _traced: &Traced) {}
     /// Whether to stop as soon as possible.
     fn cancelled(&self) -> bool {
         false
@@ -106,7 +110,10 @@ pub struct Renderer<'s> {
     scene: &'s Scene,
     camera: &'s Camera,
     image: ImageSettings,
+    layers: Layers,
+    next: Option<&'s Scene>,
     window: Option<Window>,
+    overscan: [u32; 2],
     max_depth: u32,
     seed: u64,
     threads: usize,
@@ -121,6 +128,8 @@ pub struct Rendering {
     pub picture: Picture,
     /// Work and time.
     pub stats: Stats,
+    /// What the numbers in its id channels stand for.
+    pub names: IdNames,
 }
 
 impl Rendering {
@@ -144,7 +153,10 @@ impl<'s> Renderer<'s> {
             scene,
             camera: scene.camera(None).ok_or(RenderError::NoCamera)?,
             image: scene.image.clone().ok_or(RenderError::NoImage)?,
+            layers: scene.layers,
+            next: None,
             window: None,
+            overscan: [0; 2],
             max_depth: scene.render.max_depth,
             seed: scene.render.seed,
             threads: 0,
@@ -175,6 +187,24 @@ impl<'s> Renderer<'s> {
     /// Pixels of the whole picture.
     pub fn resolution(mut self, width: u32, height: u32) -> Self {
         (self.image.width, self.image.height) = (width, height);
+        self
+    }
+
+    /// Layers beside the colour, in place of the scene's.
+    pub fn layers(mut self, layers: Layers) -> Self {
+        self.layers = layers;
+        self
+    }
+
+    /// The scene at the next frame, which the motion layer leads to; without one nothing moves.
+    pub fn next_frame(mut self, next: &'s Scene) -> Self {
+        self.next = Some(next);
+        self
+    }
+
+    /// Pixels beyond the picture, so many on the left and right side and so many above and below: for compositing.
+    pub fn overscan(mut self, pixels: [u32; 2]) -> Self {
+        self.overscan = pixels;
         self
     }
 
@@ -224,6 +254,11 @@ impl<'s> Renderer<'s> {
         &self.image
     }
 
+    /// The layers in force.
+    pub fn aovs(&self) -> Layers {
+        self.layers
+    }
+
     /// The camera in force.
     pub fn view(&self) -> &'s Camera {
         self.camera
@@ -263,6 +298,7 @@ impl<'s> Renderer<'s> {
                     return None;
                 }
                 let traced = task.trace(block, &stopped)?;
+                progress.block(&task, &traced);
                 let samples = task.samples(block);
                 progress.advance(done.fetch_add(samples, Ordering::Relaxed) + samples, task.total());
                 Some(traced)
@@ -272,9 +308,17 @@ impl<'s> Renderer<'s> {
         })
     }
 
+    /// The pixels that are rendered.
+    ///
+    /// # Errors
+    /// [`RenderError::BadWindow`].
+    pub fn window(&self) -> Result<Window, RenderError> {
+        self.checked_window()
+    }
+
     fn checked_window(&self) -> Result<Window, RenderError> {
         let display = (self.image.width, self.image.height);
-        let full = Window::full(display);
+        let full = Window::full(display).grown(self.overscan);
         let window = self.window.unwrap_or(full);
         match window.area() > 0 && full.holds(&window) {
             true => Ok(window),
@@ -300,6 +344,8 @@ pub struct Frame<'s> {
     rays: CameraRays,
     spp: u32,
     max_depth: u32,
+    /// What depth is counted along; `None`: along each ray.
+    axis: Option<DVec3>,
     plan_seconds: f64,
     build_seconds: f64,
 }
@@ -308,7 +354,8 @@ impl<'s> Frame<'s> {
     /// Plans and builds.
     pub fn prepare(renderer: &Renderer<'s>) -> Self {
         let start = Instant::now();
-        let plan = Plan::leaving_out(renderer.skips, renderer.scene, renderer.camera.eye);
+        let mut plan = Plan::leaving_out(renderer.skips, renderer.scene, renderer.camera.eye);
+        plan.leave_out_layers(renderer.layers);
         let parts = plan.parts();
         let plan_seconds = start.elapsed().as_secs_f64();
         let tree = Tree::new(parts, &plan.visible).one_by_one(renderer.engine == Engine::Single);
@@ -316,7 +363,8 @@ impl<'s> Frame<'s> {
         let image = &renderer.image;
         let display = (image.width, image.height);
         let rays = CameraRays::new(renderer.camera, plan.origin, display, image.filter, image.spp, renderer.seed);
-        Frame { plan, tree, rays, spp: image.spp, max_depth: renderer.max_depth, plan_seconds, build_seconds }
+        let (spp, max_depth, axis) = (image.spp, renderer.max_depth, renderer.camera.view_axis());
+        Frame { plan, tree, rays, spp, max_depth, axis, plan_seconds, build_seconds }
     }
 
     /// What the coordinates of its rays are relative to.

@@ -2,11 +2,16 @@
 
 use std::time::Instant;
 
+use glam::{DVec2, DVec3};
+
+use super::layers::{LayerPlan, LayerWork, Near, Sums};
 use super::{Renderer, Stats};
 use crate::film::{Picture, Window};
 use crate::integrate::{RayCounts, RayKind};
+use crate::plan::Kind;
 use crate::reference::{EventKind, Pixel, Reference, View};
 use crate::scene::RenderSettings;
+use crate::shapes::RowRef;
 
 /// A frame whose rows are its blocks. There are no columns, no tree and no tests to count; of the shadow rays it is
 /// not known how many met something.
@@ -14,6 +19,8 @@ pub(super) struct Rows {
     tracer: Reference,
     view: View,
     window: Window,
+    /// What the tracer's coordinates are relative to.
+    origin: DVec3,
     plan_seconds: f64,
 }
 
@@ -21,8 +28,9 @@ pub(super) struct Rows {
 #[derive(Debug)]
 pub(super) struct RowWork {
     row: usize,
-    pixels: Vec<[f32; 4]>,
+    pub pixels: Vec<[f32; 4]>,
     counts: RayCounts,
+    pub layers: Option<LayerWork>,
 }
 
 impl Rows {
@@ -32,22 +40,31 @@ impl Rows {
         let integrator = renderer.scene.render.integrator;
         let settings = RenderSettings { integrator, max_depth: renderer.max_depth, seed: renderer.seed };
         let view = tracer.view(renderer.camera, &renderer.image, &settings);
-        Rows { tracer, view, window, plan_seconds: start.elapsed().as_secs_f64() }
+        Rows { tracer, view, window, origin: renderer.camera.eye, plan_seconds: start.elapsed().as_secs_f64() }
     }
 
     /// A row, counted from 0; `None` where `stop` asked for that within.
-    pub fn trace(&self, row: usize, stop: &(dyn Fn() -> bool + Sync)) -> Option<RowWork> {
+    pub fn trace(&self, row: usize, layers: Option<&LayerPlan>, stop: &(dyn Fn() -> bool + Sync)) -> Option<RowWork> {
         let (mut counts, y) = (RayCounts::default(), self.window.y0 + row as i32);
-        let mut pixel = |x| {
+        let (width, spp) = (self.window.width(), self.view.samples());
+        let mut sums = layers.map(|plan| (plan, Sums::new(plan, width, spp)));
+        let mut places = Vec::new();
+        let mut pixel = |(index, x)| {
             if stop() {
                 return None;
             }
             let pixel = self.tracer.pixel(&self.view, x, y);
             add(&mut counts, &pixel);
+            if let Some((plan, sums)) = &mut sums {
+                add_layers(plan, sums, index, &pixel);
+                places.push(place(&pixel, self.origin));
+            }
             Some(pixel.rgba.map(|sample| sample as f32))
         };
-        let pixels: Option<Vec<_>> = (self.window.x0..self.window.x1).map(&mut pixel).collect();
-        Some(RowWork { row, pixels: pixels?, counts })
+        let pixels: Option<Vec<_>> = (self.window.x0..self.window.x1).enumerate().map(&mut pixel).collect();
+        let pixels = pixels?;
+        let layers = sums.map(|(plan, sums)| sums.finish(plan, |pixel, _| places[pixel]));
+        Some(RowWork { row, pixels, counts, layers })
     }
 
     pub fn stats(&self, threads: usize, trace_seconds: f64) -> Stats {
@@ -56,12 +73,57 @@ impl Rows {
 }
 
 impl RowWork {
+    /// Its pixels, in a picture of this window.
+    pub fn window(&self, window: Window) -> Window {
+        let y0 = window.y0 + self.row as i32;
+        Window { y0, y1: y0 + 1, ..window }
+    }
+
     /// Puts the row where it belongs.
     pub fn add_to(&self, picture: &mut Picture, stats: &mut Stats) {
         let start = self.row * self.pixels.len();
         picture.pixels[start..start + self.pixels.len()].copy_from_slice(&self.pixels);
         stats.rays.add(&self.counts);
     }
+}
+
+/// Adds the samples of a pixel to the layers of its row.
+fn add_layers(plan: &LayerPlan, sums: &mut Sums, index: usize, pixel: &Pixel) {
+    for (sample, seen) in pixel.samples.iter().enumerate() {
+        if sums.want_variance() {
+            sums.add_radiance(index, seen.radiance.as_vec3().to_array());
+        }
+        let Some(first) = &seen.first else { continue };
+        let (primitive, material) = (first.primitive as u32, first.material as u32);
+        for (sums, value) in [(&mut sums.normal, first.normal), (&mut sums.albedo, first.albedo)] {
+            if let Some(sum) = sums.get_mut(index) {
+                *sum = (DVec3::from_array(*sum) + value).to_array();
+            }
+        }
+        if sums.want_mattes() {
+            sums.add_to_mattes(plan, index, primitive, material);
+        }
+        if nearest(pixel) == Some(sample)
+            && let Some(near) = sums.near.get_mut(index)
+        {
+            // A row of no store: any that is no miss will do.
+            let row = RowRef::new(Kind::Sphere, 0);
+            let (t, depth) = (0.0, first.depth as f32);
+            *near = Near { distance: seen.distance, t, depth, row, primitive, material, sample: sample as u32 };
+        }
+    }
+}
+
+/// The sample nearest to the pixel's centre, the first of equals.
+fn nearest(pixel: &Pixel) -> Option<usize> {
+    let samples = pixel.samples.iter().enumerate();
+    samples.min_by(|a, b| a.1.distance.total_cmp(&b.1.distance)).map(|(sample, _)| sample)
+}
+
+/// The point in the world and the texture coordinates that the nearest sample sees.
+fn place(pixel: &Pixel, origin: DVec3) -> (DVec3, DVec2) {
+    let first = nearest(pixel).and_then(|sample| pixel.samples[sample].first.as_ref());
+    first.map_or_else(Default::default, |first| (first.point + origin, first.uv))
 }
 
 fn add(counts: &mut RayCounts, pixel: &Pixel) {

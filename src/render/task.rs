@@ -2,13 +2,17 @@
 //!
 //! [`Renderer::render`] gives all blocks to the threads of one pool; a batch hands out those of several pictures.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::block::{Block, BlockWork};
+use super::layers::{LayerPlan, LayerTape};
 use super::reference::{RowWork, Rows};
-use super::{Engine, Frame, RenderError, Renderer, Rendering};
+use super::{Engine, Frame, IdNames, RenderError, Renderer, Rendering};
 use crate::film::{Picture, Window};
 use crate::integrate::Silent;
+use crate::plan::Skip;
+use crate::scene::{Aov, Layers};
 
 /// A picture whose tree is built and whose blocks wait for threads.
 pub struct Task<'s> {
@@ -16,6 +20,10 @@ pub struct Task<'s> {
     window: Window,
     spp: u32,
     work: Work<'s>,
+    /// Where layers are asked for.
+    layers: Option<LayerPlan<'s>>,
+    /// Nobody asked for the layers.
+    unasked: bool,
 }
 
 enum Work<'s> {
@@ -25,13 +33,14 @@ enum Work<'s> {
     Rows(Box<Rows>),
 }
 
-/// What a block came to; [`Task::finish`] puts it where it belongs.
-#[derive(Debug)]
-pub struct Traced(Part);
+/// What a block came to; [`Task::finish`] puts it where it belongs. Copies share it.
+#[derive(Debug, Clone)]
+pub struct Traced(Arc<Part>);
 
 #[derive(Debug)]
+#[allow(clippy::large_enum_variant)] // each lies behind a pointer of its own
 enum Part {
-    Block(Block, Box<BlockWork>),
+    Block(Block, BlockWork),
     Row(RowWork),
 }
 
@@ -47,7 +56,14 @@ impl<'s> Task<'s> {
             Engine::Packet | Engine::Single => Work::Blocks(Box::new(Frame::prepare(renderer)), Block::cover(window)),
         };
         let display = (renderer.image.width, renderer.image.height);
-        Ok(Task { display, window, spp: renderer.image.spp, work })
+        // Work that is not to be left out is done, and what comes of it dropped.
+        let unasked = renderer.layers.is_empty() && !renderer.skips.has(Skip::Layers);
+        let all = Aov::ALL.into_iter().fold(renderer.layers, Layers::with);
+        let layers = match unasked {
+            true => Some(LayerPlan::new(renderer, all)),
+            false => (!renderer.layers.is_empty()).then(|| LayerPlan::new(renderer, renderer.layers)),
+        };
+        Ok(Task { display, window, spp: renderer.image.spp, work, layers, unasked })
     }
 
     /// How many blocks there are.
@@ -77,11 +93,34 @@ impl<'s> Task<'s> {
         let part = match &self.work {
             Work::Blocks(frame, blocks) => {
                 let block = blocks[block];
-                Part::Block(block, Box::new(block.trace(&frame.rays, &frame.direct(), self.spp, &mut Silent)))
+                Part::Block(block, self.trace_block(frame, &block))
             }
-            Work::Rows(rows) => Part::Row(rows.trace(block, stop)?),
+            Work::Rows(rows) => Part::Row(rows.trace(block, self.layers.as_ref(), stop)?),
         };
-        Some(Traced(part))
+        Some(Traced(Arc::new(part)))
+    }
+
+    /// Where a block lies, and its colour row by row.
+    pub fn pixels<'t>(&self, traced: &'t Traced) -> (Window, &'t [[f32; 4]]) {
+        match &*traced.0 {
+            Part::Block(block, work) => (block.window, &work.pixels),
+            Part::Row(row) => (row.window(self.window), &row.pixels),
+        }
+    }
+
+    fn trace_block(&self, frame: &Frame, block: &Block) -> BlockWork {
+        let Some(plan) = &self.layers else {
+            return block.trace(&frame.rays, &frame.direct(), self.spp, &mut Silent);
+        };
+        // What a pixel costs depends on those that are traced with it: they must not depend on a crop.
+        let whole = if plan.layers.has(Aov::Cost) { block.whole() } else { *block };
+        let mut tape = LayerTape::new(frame, plan, whole.window.area());
+        let mut work = whole.trace(&frame.rays, &frame.direct(), self.spp, &mut tape);
+        work.layers = Some(tape.finish(whole.window));
+        if whole.window != block.window {
+            block.cut(&whole, &mut work);
+        }
+        work
     }
 
     /// The picture of all blocks, whatever their order; `threads` and `start` (of tracing) are for its statistics.
@@ -92,11 +131,11 @@ impl<'s> Task<'s> {
             Work::Blocks(frame, _) => frame.stats(threads, seconds),
             Work::Rows(rows) => rows.stats(threads, seconds),
         };
-        for Traced(part) in traced {
-            match part {
+        for Traced(part) in &traced {
+            match &**part {
                 Part::Block(block, work) => {
                     block.copy_to(&work.pixels, &mut picture);
-                    stats.add(&work);
+                    stats.add(work);
                 }
                 Part::Row(row) => row.add_to(&mut picture, &mut stats),
             }
@@ -104,6 +143,15 @@ impl<'s> Task<'s> {
         if let Work::Blocks(frame, _) = &self.work {
             stats.skipped = frame.plan.skips.report(&stats.left_out);
         }
-        Rendering { picture, stats }
+        let mut names = IdNames::default();
+        if let Some(plan) = self.layers.as_ref().filter(|_| !self.unasked) {
+            let works = traced.iter().filter_map(|Traced(part)| match &**part {
+                Part::Block(block, work) => Some((block.window, work.layers.as_ref()?)),
+                Part::Row(row) => Some((row.window(self.window), row.layers.as_ref()?)),
+            });
+            plan.add_to(works, &mut picture);
+            names = plan.names(&picture);
+        }
+        Rendering { picture, stats, names }
     }
 }

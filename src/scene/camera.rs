@@ -57,6 +57,14 @@ impl Camera {
         if angle == 0.0 { self.eye } else { self.target + turn * (self.eye - self.target) }
     }
 
+    /// What depth is counted along; none for a panorama, where it is the distance from the eye.
+    pub fn view_axis(&self) -> Option<DVec3> {
+        match self.lens {
+            Lens::Pinhole { .. } | Lens::Orthographic { .. } | Lens::ThinLens { .. } => Some(self.axes().2),
+            Lens::Panoramic => None,
+        }
+    }
+
     /// `(right, true_up, forward)`, each of unit length.
     pub fn axes(&self) -> (DVec3, DVec3, DVec3) {
         let forward = (self.target - self.eye).normalize();

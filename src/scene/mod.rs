@@ -16,9 +16,12 @@ mod fit;
 mod frames;
 mod hash;
 mod image;
+mod layers;
 mod light;
 mod material;
+mod motion;
 pub mod nff;
+mod objects;
 pub mod particles;
 pub mod pattern;
 pub(crate) mod picture_file;
@@ -40,8 +43,11 @@ pub use self::cloud::{Cloud, CloudMaterial, CloudShapes, Rows};
 pub use self::error::{Place, SceneError, SceneErrors, Warning};
 pub use self::frames::Frames;
 pub use self::image::{Filter, FilterKind, FilterTable, ImageSettings, Integrator, RenderSettings};
+pub use self::layers::{Aov, Layers, UnknownAov};
 pub use self::light::{Falloff, Light, Source};
 pub use self::material::{Material, Model, Paint, Visible};
+pub use self::motion::carried;
+pub use self::objects::Objects;
 pub use self::shape::{Cone, Cuboid, Cylinder, Disk, Plane, Polygon, Shape, Sphere, basis};
 pub use self::texture::{Checker, ColorSpace, ImageTexture, Texel, Texture, TextureFilter, TextureKind, Wrap};
 
@@ -53,6 +59,8 @@ pub use self::texture::{Checker, ColorSpace, ImageTexture, Texel, Texture, Textu
 pub struct Scene {
     /// Size, samples and filter of the picture; absent where a scene is only queried.
     pub image: Option<ImageSettings>,
+    /// Layers beside the colour.
+    pub layers: Layers,
     /// Integrator, depth and seed.
     pub render: RenderSettings,
     /// All cameras in file order; the first is the default one. May be empty.

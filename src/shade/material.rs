@@ -128,6 +128,16 @@ impl Bsdf8 {
         }
     }
 
+    /// The share of light that comes back, 0 to 1: the albedo and the highlight, the reflectance of mirrors, the
+    /// tint of glass.
+    #[inline(always)]
+    pub fn reflectance(&self) -> Vec3x8 {
+        let one = float8(1.0);
+        let color = self.color * (self.diffuse + (one - self.lit));
+        let channel = |x: Float8| (x + self.specular).fast_min(one).fast_max(Float8::ZERO);
+        Vec3x8::new(channel(color.x), channel(color.y), channel(color.z))
+    }
+
     /// `(n . wi)` and highlight of one light: what `E/pi` is multiplied with.
     #[inline(always)]
     pub fn response(&self, cos: Float8, highlight: impl FnOnce() -> Float8) -> Vec3x8 {

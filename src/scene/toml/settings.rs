@@ -4,13 +4,13 @@ use glam::DVec3;
 
 use super::Reader;
 use super::names::Names;
-use super::table::{Item, Table};
+use super::table::Table;
 use super::values::{choice, color, direction, file, flag, number, point, text, whole};
 use crate::scene::fit;
 use crate::scene::frames::OpenCamera;
 use crate::scene::rules::{self, Rule};
 use crate::scene::{
-    Backdrop, Background, Camera, Filter, FilterKind, ImageSettings, ImageTexture, Integrator, Lens, Part,
+    Backdrop, Background, Camera, Filter, FilterKind, ImageSettings, ImageTexture, Integrator, Layers, Lens, Part,
     RenderSettings, TextureFilter, Wrap,
 };
 
@@ -44,7 +44,10 @@ const LENSES: &[(&str, LensKind)] = &[
 impl<'a> Reader<'a, '_> {
     /// Reads all tables that are there once.
     pub fn read_settings(&mut self) {
-        self.scene.image = self.single("image").and_then(image);
+        if let Some(table) = self.single("image") {
+            self.scene.layers = layers(&table).unwrap_or_default();
+            self.scene.image = image(table);
+        }
         self.claim(Some(Part::Image));
         if let Some(render) = self.single("render").and_then(render) {
             self.scene.render = render;
@@ -151,9 +154,6 @@ fn image(table: Table<'_>) -> Option<ImageSettings> {
     let kind = table.or("filter", FilterKind::Gaussian, choice(FILTERS));
     let radius = if kind == Some(FilterKind::Box) { 0.5 } else { 1.5 };
     let radius = table.or("filter_radius", radius, number(Rule::FILTER_RADIUS));
-    if let Some(item) = table.item("aovs") {
-        no_layers(&item);
-    }
     if let (Some(width), Some(height)) = (width, height)
         && width * height > MOST_PIXELS
     {
@@ -165,17 +165,29 @@ fn image(table: Table<'_>) -> Option<ImageSettings> {
     Some(ImageSettings { width: width? as u32, height: height? as u32, spp: spp? as u32, filter })
 }
 
-fn no_layers(item: &Item<'_>) {
-    match item.elements().map(|elements| elements.len()) {
-        Some(0) => {}
-        Some(_) => {
-            let rule = "layers besides colour are not in this version: leave \"aovs\" out";
-            item.context.fail(&item.span, rule, item.quote());
+/// The keys of `[image]` that say which layers there are beside the colour.
+fn layers(table: &Table<'_>) -> Option<Layers> {
+    let named = table.or("aovs", Layers::default(), |item| {
+        let Some(mut elements) = item.elements() else {
+            return item.wrong("must be a list of names");
+        };
+        elements.try_fold(Layers::default(), |layers, element| {
+            let found = layers.with_named(&text(&element)?);
+            found.map_err(|unknown| element.context.fail(&element.span, unknown.to_string(), "")).ok()
+        })
+    });
+    let ranks = table.or("crypto_ranks", 6, |item| {
+        let ranks = whole(2, u64::from(Layers::MOST_RANKS))(item)?;
+        if ranks % 2 == 1 {
+            item.context.fail(&item.span, "crypto_ranks must be even: two share a layer", ranks.to_string());
+            return None;
         }
-        None => {
-            item.wrong::<()>("must be a list of names");
-        }
-    }
+        Some(ranks)
+    });
+    let instances = table.or("instances", false, choice(&[("grouped", false), ("each", true)]));
+    let mut layers = named?;
+    (layers.ranks, layers.instances) = (ranks? as u8, instances?);
+    Some(layers)
 }
 
 fn render(table: Table<'_>) -> Option<RenderSettings> {

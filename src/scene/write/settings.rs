@@ -7,14 +7,14 @@ use glam::DVec3;
 
 use super::text::{Table, keys, list, number, path, quoted, vector};
 use crate::scene::{
-    Backdrop, Background, Camera, ColorSpace, Falloff, FilterKind, ImageSettings, Integrator, Lens, Light, Material,
-    Model, Paint, Part, RenderSettings, Scene, Source, Texture, TextureFilter, TextureKind, Visible, Wrap,
+    Backdrop, Background, Camera, ColorSpace, Falloff, FilterKind, ImageSettings, Integrator, Layers, Lens, Light,
+    Material, Model, Paint, Part, RenderSettings, Scene, Source, Texture, TextureFilter, TextureKind, Visible, Wrap,
 };
 
 /// Adds the tables of everything but shapes and clouds.
 pub(super) fn all(scene: &Scene, file: &Path, add: &mut impl FnMut(Table)) -> io::Result<()> {
     let is_animated = |part| scene.tracks.iter().any(|track| track.part == Some(part));
-    scene.image.iter().for_each(|settings| add(image(settings).over_time(scene, Part::Image)));
+    scene.image.iter().for_each(|settings| add(image(settings, scene.layers).over_time(scene, Part::Image)));
     if scene.render != RenderSettings::default() || is_animated(Part::Render) {
         add(render(&scene.render).over_time(scene, Part::Render));
     }
@@ -40,18 +40,23 @@ pub(super) fn all(scene: &Scene, file: &Path, add: &mut impl FnMut(Table)) -> io
     Ok(())
 }
 
-fn image(image: &ImageSettings) -> Table {
+fn image(image: &ImageSettings, layers: Layers) -> Table {
     let filter = match image.filter.kind {
         FilterKind::Box => "box",
         FilterKind::Gaussian => "gaussian",
         FilterKind::BlackmanHarris => "blackman-harris",
     };
+    let usual = Layers::default();
+    let names = (!layers.is_empty()).then(|| list(layers.iter().map(|aov| quoted(aov.name()))));
     Table::new("image")
         .set("width", image.width)
         .set("height", image.height)
         .set("spp", image.spp)
         .set("filter", quoted(filter))
         .set("filter_radius", number(image.filter.radius))
+        .set_some("aovs", names)
+        .set_some("crypto_ranks", (layers.ranks != usual.ranks).then_some(layers.ranks))
+        .set_some("instances", layers.instances.then(|| quoted("each")))
 }
 
 fn render(render: &RenderSettings) -> Table {

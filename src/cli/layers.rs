@@ -1,0 +1,164 @@
+//! Layers beside the colour, and windows, as options.
+
+use clap::{Args, ValueEnum};
+use octray::Renderer;
+use octray::film::Window;
+use octray::scene::{Aov, Layers, Scene};
+
+use super::args;
+use super::exit::{Exit, Failure};
+
+/// Which layers there are beside the colour.
+#[derive(Debug, Clone, Args)]
+pub struct LayerArgs {
+    /// Layers beside the colour, in place of the scene's: depth, position, normal, albedo, uv, motion, ids, samples, variance,
+    /// crypto_object, crypto_material, crypto_asset, cryptomatte (those three), all
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    aov: Vec<String>,
+    /// Add what each pixel cost (cost.box, cost.prim, cost.lanes), and draw it: FILE.cost.png
+    #[arg(long)]
+    pub cost: bool,
+    /// Ids that a Cryptomatte keeps of a pixel: even, from 2 to 16 [default: as in the scene, 6]
+    #[arg(long, value_name = "N", value_parser = ranks)]
+    crypto_ranks: Option<u8>,
+    /// What ids and Cryptomattes tell apart of a cloud [default: as in the scene, grouped]
+    #[arg(long, value_enum, value_name = "HOW")]
+    instances: Option<Instances>,
+}
+
+/// What a cloud is in ids and Cryptomattes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Instances {
+    /// One object
+    Grouped,
+    /// Each row is an object of its own: name:17
+    Each,
+}
+
+/// Which pixels are rendered.
+#[derive(Debug, Clone, Args)]
+pub struct Windows {
+    /// Render only these pixels, the second corner excluded; they are the same as in the whole picture
+    #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = args::crop, allow_hyphen_values = true)]
+    crop: Option<Window>,
+    /// The same by shares of width and height: 0,0,0.5,1 is the left half
+    #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = ndc, allow_hyphen_values = true, conflicts_with = "crop")]
+    crop_ndc: Option<[f64; 4]>,
+    /// Render so many pixels, or percents of width and height, beyond each side as well
+    #[arg(long, value_name = "N|N%", value_parser = overscan)]
+    overscan: Option<Overscan>,
+}
+
+/// What is added on each side.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Overscan {
+    Pixels(u32),
+    Percent(f64),
+}
+
+/// Most pixels beyond a side, as many as along one.
+const MOST_OVERSCAN: u32 = 65_536;
+
+impl LayerArgs {
+    /// The layers of a render.
+    pub fn layers(&self, scene: &Scene) -> Result<Layers, Failure> {
+        let start = if self.aov.is_empty() { scene.layers } else { Layers::default() };
+        let named = self.aov.iter().try_fold(start, |layers, name| layers.with_named(name.trim()));
+        let mut layers = named.map_err(|unknown| Failure::new(Exit::Usage, format!("--aov: {unknown}")))?;
+        layers.ranks = self.crypto_ranks.unwrap_or(scene.layers.ranks);
+        layers.instances = self.instances.map_or(scene.layers.instances, |how| how == Instances::Each);
+        Ok(if self.cost { layers.with(Aov::Cost) } else { layers })
+    }
+}
+
+impl Windows {
+    /// Whether the user chose what part of the picture there is.
+    pub fn is_crop(&self) -> bool {
+        self.crop.is_some() || self.crop_ndc.is_some()
+    }
+
+    /// Sets the windows of a renderer.
+    pub fn apply<'s>(&self, renderer: Renderer<'s>) -> Renderer<'s> {
+        let display = (renderer.image().width, renderer.image().height);
+        let mut renderer = renderer;
+        if let Some(overscan) = self.overscan {
+            renderer = renderer.overscan(overscan.pixels(display));
+        }
+        match self.crop.or_else(|| self.crop_ndc.map(|corners| of_shares(corners, display))) {
+            Some(window) => renderer.crop(window),
+            None => renderer,
+        }
+    }
+}
+
+impl Overscan {
+    fn pixels(self, (width, height): (u32, u32)) -> [u32; 2] {
+        match self {
+            Overscan::Pixels(pixels) => [pixels; 2],
+            Overscan::Percent(percent) => {
+                [width, height].map(|side| (f64::from(side) * percent / 100.0).round() as u32)
+            }
+        }
+    }
+}
+
+/// Pixels whose centres lie within the shares.
+fn of_shares([x0, y0, x1, y1]: [f64; 4], (width, height): (u32, u32)) -> Window {
+    let pixel = |share: f64, side: u32| (share * f64::from(side)).round() as i32;
+    Window { x0: pixel(x0, width), y0: pixel(y0, height), x1: pixel(x1, width), y1: pixel(y1, height) }
+}
+
+fn ndc(text: &str) -> Result<[f64; 4], String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
+    let finite = |x: &f64| x.abs() <= 1e3;
+    match numbers.as_deref() {
+        Some(&[x0, y0, x1, y1]) if x0 < x1 && y0 < y1 && [x0, y0, x1, y1].iter().all(finite) => Ok([x0, y0, x1, y1]),
+        _ => Err("should be X0,Y0,X1,Y1 with X0 < X1 and Y0 < Y1: 0,0 is the upper left corner, 1,1 the lower right \
+                  one"
+        .to_owned()),
+    }
+}
+
+fn overscan(text: &str) -> Result<Overscan, String> {
+    let found = match text.strip_suffix('%') {
+        Some(percent) => percent.trim().parse().ok().filter(|x| (0.0..=1000.0).contains(x)).map(Overscan::Percent),
+        None => text.trim().parse().ok().filter(|x| *x <= MOST_OVERSCAN).map(Overscan::Pixels),
+    };
+    found.ok_or_else(|| "should be pixels such as 32, or percents of the picture such as 10%".to_owned())
+}
+
+fn ranks(text: &str) -> Result<u8, String> {
+    let ranks = text.parse().ok().filter(|ranks| (2..=Layers::MOST_RANKS).contains(ranks) && ranks % 2 == 0);
+    ranks.ok_or_else(|| "should be an even number from 2 to 16, such as 6".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn overscan_is_pixels_or_percents() {
+        assert_eq!(overscan("32").map(|over| over.pixels((640, 480))), Ok([32, 32]));
+        assert_eq!(overscan("10%").map(|over| over.pixels((640, 485))), Ok([64, 49]));
+        for text in ["", "-1", "1.5", "x%", "-3%", "nan%", "99999999"] {
+            assert!(overscan(text).unwrap_err().contains("10%"), "{text}");
+        }
+    }
+
+    #[test]
+    fn shares_of_a_picture_are_whole_pixels() {
+        let halves = [[0.0, 0.0, 0.5, 1.0], [0.5, 0.0, 1.0, 1.0]].map(|corners| of_shares(corners, (101, 50)));
+        assert_eq!(halves[0], Window { x0: 0, y0: 0, x1: 51, y1: 50 });
+        assert_eq!(halves[1], Window { x0: 51, y0: 0, x1: 101, y1: 50 });
+        assert_eq!(ndc("0, 0,0.5,1"), Ok([0.0, 0.0, 0.5, 1.0]));
+        for text in ["", "0,0,1", "0,0,0,1", "0,0,nan,1", "0,0,inf,1"] {
+            assert!(ndc(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn ranks_come_in_pairs() {
+        assert_eq!(ranks("16"), Ok(16));
+        assert!(["0", "3", "18", "x"].iter().all(|text| ranks(text).is_err()));
+    }
+}

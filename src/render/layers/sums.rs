@@ -1,0 +1,165 @@
+//! The layers of a block in the making, and as channels.
+
+use glam::{DVec2, DVec3};
+
+use super::LayerPlan;
+use super::matte::{Rank, Tally, ranked};
+use super::near::{Batches, Near};
+use crate::film::Samples;
+use crate::scene::Aov;
+use crate::shapes::RowRef;
+
+/// Sums and choices of a block's pixels, row by row; empty where no layer needs them.
+#[derive(Debug)]
+pub(in crate::render) struct Sums {
+    pixels: usize,
+    /// Samples of each pixel.
+    spp: u32,
+    /// Sums of what passes the pixel filter: samples are drawn from it, so all weigh the same.
+    pub normal: Vec<[f64; 3]>,
+    pub albedo: Vec<[f64; 3]>,
+    /// Sums of shares: box tests, primitive tests, live lanes, lanes.
+    pub cost: Vec<[f64; 4]>,
+    pub near: Vec<Near>,
+    batches: Vec<Batches>,
+    batch: u32,
+    tallies: [Option<Tally>; Aov::CRYPTOMATTES.len()],
+}
+
+/// The layers of a block, ready to be put where they belong.
+#[derive(Debug)]
+pub(in crate::render) struct LayerWork {
+    /// In the order of the plan's channels.
+    pub channels: Vec<Samples>,
+    /// Keys that each Cryptomatte shows, in order.
+    pub seen: [Vec<u32>; Aov::CRYPTOMATTES.len()],
+}
+
+impl Sums {
+    pub fn new(plan: &LayerPlan, pixels: usize, spp: u32) -> Self {
+        let layers = plan.layers;
+        let room = |aovs: &[Aov]| if layers.has_any(aovs) { pixels } else { 0 };
+        Sums {
+            pixels,
+            spp,
+            normal: vec![[0.0; 3]; room(&[Aov::Normal])],
+            albedo: vec![[0.0; 3]; room(&[Aov::Albedo])],
+            cost: vec![[0.0; 4]; room(&[Aov::Cost])],
+            near: vec![Near::NONE; room(&[Aov::Depth, Aov::Position, Aov::Uv, Aov::Motion, Aov::Ids])],
+            batches: vec![Batches::default(); room(&[Aov::Variance])],
+            batch: Batches::size(spp),
+            tallies: Aov::CRYPTOMATTES.map(|aov| layers.has(aov).then(|| Tally::new(pixels))),
+        }
+    }
+
+    /// Whether the variance is asked for.
+    pub fn want_variance(&self) -> bool {
+        !self.batches.is_empty()
+    }
+
+    /// Adds the next sample's radiance to the variance of a pixel.
+    #[inline]
+    pub fn add_radiance(&mut self, pixel: usize, radiance: [f32; 3]) {
+        self.batches[pixel].add(radiance, self.batch);
+    }
+
+    /// Whether any Cryptomatte is asked for.
+    pub fn want_mattes(&self) -> bool {
+        self.tallies.iter().any(Option::is_some)
+    }
+
+    /// Adds what a sample of a pixel saw to the Cryptomattes.
+    pub fn add_to_mattes(&mut self, plan: &LayerPlan, pixel: usize, primitive: u32, material: u32) {
+        for (tally, aov) in self.tallies.iter_mut().zip(Aov::CRYPTOMATTES) {
+            if let Some(tally) = tally {
+                tally.add(pixel, plan.key(aov, primitive, material));
+            }
+        }
+    }
+
+    /// All channels. `place` gives the point in the world and the texture coordinates that the nearest sample of
+    /// a pixel sees.
+    pub fn finish(self, plan: &LayerPlan, place: impl Fn(usize, &Near) -> (DVec3, DVec2)) -> LayerWork {
+        let mut work = LayerWork { channels: Vec::new(), seen: Default::default() };
+        let wants_place = plan.layers.has_any(&[Aov::Position, Aov::Uv, Aov::Motion]);
+        let places: Vec<_> = match wants_place {
+            true => self.near.iter().enumerate().map(|(pixel, near)| placed(near, || place(pixel, near))).collect(),
+            false => Vec::new(),
+        };
+        for aov in plan.layers.iter() {
+            match aov {
+                Aov::Depth => work.floats(self.near.iter().map(|near| near.depth)),
+                Aov::Position => (0..3).for_each(|k| work.floats(places.iter().map(|place| place.0[k] as f32))),
+                Aov::Normal => (0..3).for_each(|k| work.halves(self.mean(&self.normal, k))),
+                Aov::Albedo => (0..3).for_each(|k| work.halves(self.mean(&self.albedo, k))),
+                Aov::Uv => (0..2).for_each(|k| work.floats(places.iter().map(|place| place.1[k] as f32))),
+                Aov::Motion => {
+                    let moves = self.near.iter().zip(&places).map(|(near, place)| match near.row {
+                        RowRef::MISS => [0.0; 2],
+                        _ => plan.motion(near.primitive, place.0),
+                    });
+                    let moves: Vec<_> = moves.collect();
+                    (0..2).for_each(|k| work.floats(moves.iter().map(|way| way[k])));
+                }
+                Aov::Ids => self.add_ids(plan, &mut work),
+                Aov::Samples => work.floats(std::iter::repeat_n(self.spp as f32, self.pixels)),
+                Aov::Variance => {
+                    let all: Vec<_> = self.batches.iter().map(|batches| batches.variance(self.batch)).collect();
+                    (0..3).for_each(|k| work.floats(all.iter().map(|variance| variance[k])));
+                }
+                Aov::Cost => {
+                    (0..2).for_each(|k| work.floats(self.cost.iter().map(|cost| cost[k] as f32)));
+                    work.floats(self.cost.iter().map(|cost| (cost[2] / cost[3].max(1.0)) as f32));
+                }
+                Aov::CryptoObject | Aov::CryptoMaterial | Aov::CryptoGroup => self.add_mattes(plan, aov, &mut work),
+            }
+        }
+        work
+    }
+
+    fn mean<'a>(&self, sums: &'a [[f64; 3]], k: usize) -> impl Iterator<Item = f32> + use<'a> {
+        let share = 1.0 / f64::from(self.spp);
+        sums.iter().map(move |sum| (sum[k] * share) as f32)
+    }
+
+    fn add_ids(&self, plan: &LayerPlan, work: &mut LayerWork) {
+        let seen = |near: &Near| near.row != RowRef::MISS;
+        let number = |near: &Near, id: u32| if seen(near) { id + 1 } else { 0 };
+        let objects = self.near.iter().map(|near| number(near, plan.objects.of(near.primitive)));
+        work.channels.push(Samples::Uint(objects.collect()));
+        work.channels.push(Samples::Uint(self.near.iter().map(|near| number(near, near.material)).collect()));
+    }
+
+    fn add_mattes(&self, plan: &LayerPlan, aov: Aov, work: &mut LayerWork) {
+        let index = aov as usize - Aov::CryptoObject as usize;
+        let (Some(tally), kept) = (&self.tallies[index], usize::from(plan.layers.ranks)) else { return };
+        let mut columns = vec![vec![0f32; self.pixels]; 2 * kept];
+        let mut ranks: Vec<Rank> = Vec::new();
+        for pixel in 0..self.pixels {
+            ranked(tally.of(pixel), &plan.ids[index], &mut ranks);
+            for (rank, pair) in ranks.iter().zip(columns.chunks_exact_mut(2)) {
+                pair[0][pixel] = f32::from_bits(rank.id);
+                pair[1][pixel] = (f64::from(rank.count) / f64::from(self.spp)) as f32;
+            }
+            work.seen[index].extend(ranks.iter().take(kept).map(|rank| rank.key));
+        }
+        work.seen[index].sort_unstable();
+        work.seen[index].dedup();
+        work.channels.extend(columns.into_iter().map(Samples::Float));
+    }
+}
+
+impl LayerWork {
+    fn floats(&mut self, samples: impl Iterator<Item = f32>) {
+        self.channels.push(Samples::Float(samples.collect()));
+    }
+
+    fn halves(&mut self, samples: impl Iterator<Item = f32>) {
+        self.channels.push(Samples::Half(samples.collect()));
+    }
+}
+
+/// What a miss has instead of a place.
+fn placed(near: &Near, place: impl FnOnce() -> (DVec3, DVec2)) -> (DVec3, DVec2) {
+    if near.row == RowRef::MISS { Default::default() } else { place() }
+}

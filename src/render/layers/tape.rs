@@ -1,0 +1,193 @@
+//! From the engine's tiles to the layers of a block.
+
+use glam::{DVec2, DVec3};
+
+use super::LayerPlan;
+use super::near::Near;
+use super::sums::{LayerWork, Sums};
+use crate::accel::PACKETS;
+use crate::film::Window;
+use crate::integrate::{RayKind, Record, Samples8, Seen, Silent, Summed, Taken};
+use crate::lanes::{Float8, LANES, Ray, Vec3x8};
+use crate::plan::Owner;
+use crate::render::Frame;
+use crate::scene::Aov;
+use crate::shade::attributes;
+use crate::shapes::{Ray64, RowRef};
+
+/// Listens to the engine while it renders a block.
+pub(in crate::render) struct LayerTape<'a, 's> {
+    frame: &'a Frame<'s>,
+    plan: &'a LayerPlan<'s>,
+    /// What depth is counted along; `None`: along each ray.
+    axis: Option<[f32; 3]>,
+    sums: Sums,
+    tile: Box<Met>,
+}
+
+/// What the camera rays of a tile met.
+struct Met {
+    hit: [u32; PACKETS],
+    normal: [Vec3x8; PACKETS],
+    albedo: [Vec3x8; PACKETS],
+    t: [Float8; PACKETS],
+    depth: [Float8; PACKETS],
+    rows: [Float8; PACKETS],
+    owners: [[Owner; LANES]; PACKETS],
+    materials: [[u32; LANES]; PACKETS],
+}
+
+impl<'a, 's> LayerTape<'a, 's> {
+    pub fn new(frame: &'a Frame<'s>, plan: &'a LayerPlan<'s>, pixels: usize) -> Self {
+        let zero = [Vec3x8::ZERO; PACKETS];
+        let tile = Met {
+            hit: [0; PACKETS],
+            normal: zero,
+            albedo: zero,
+            t: [Float8::ZERO; PACKETS],
+            depth: [Float8::ZERO; PACKETS],
+            rows: [Float8::ZERO; PACKETS],
+            owners: [[Owner::default(); LANES]; PACKETS],
+            materials: [[0; LANES]; PACKETS],
+        };
+        let axis = frame.axis.map(|axis| axis.as_vec3().to_array());
+        LayerTape { frame, plan, axis, sums: Sums::new(plan, pixels, frame.spp), tile: Box::new(tile) }
+    }
+
+    /// The layers of the block that was rendered.
+    pub fn finish(self, block: Window) -> LayerWork {
+        let LayerTape { frame, plan, sums, .. } = self;
+        sums.finish(plan, |pixel, near| place(frame, block.pixel(pixel), near))
+    }
+
+    /// Adds to what passes the pixel filter, sample by sample in their order.
+    fn add_filtered(sums: &mut [[f64; 3]], values: &Vec3x8, hit: u32, pixels: &[u32; LANES]) {
+        let values = values.to_arrays();
+        for i in (0..LANES).filter(|i| hit >> i & 1 == 1) {
+            let sum = &mut sums[pixels[i] as usize];
+            *sum = std::array::from_fn(|k| sum[k] + f64::from(values[i][k]));
+        }
+    }
+
+    fn add_near(&mut self, p: usize, count: usize, taken: &Taken) {
+        let (tile, hit) = (&self.tile, self.tile.hit[p]);
+        let (t, depth, rows) = (tile.t[p].to_array(), tile.depth[p].to_array(), tile.rows[p].to_array());
+        for i in 0..count {
+            let near = &mut self.sums.near[taken.pixels[p][i] as usize];
+            let distance = taken.distances[p][i];
+            if distance < near.distance {
+                let sample = taken.samples[p].index[i];
+                *near = match hit >> i & 1 == 1 {
+                    false => Near { distance, sample, ..Near::NONE },
+                    true => Near {
+                        distance,
+                        t: t[i],
+                        depth: depth[i],
+                        row: RowRef::from_lane(rows[i]),
+                        primitive: tile.owners[p][i].primitive,
+                        material: tile.materials[p][i],
+                        sample,
+                    },
+                };
+            }
+        }
+    }
+
+    fn add_radiance(&mut self, summed: &Summed) {
+        for (p, pixels) in summed.pixels.iter().enumerate() {
+            let radiance = summed.samples.radiance[p].to_arrays();
+            for (radiance, pixel) in radiance.iter().zip(pixels).take(summed.count - p * LANES) {
+                self.sums.add_radiance(*pixel as usize, *radiance);
+            }
+        }
+    }
+
+    fn add_to_mattes(&mut self, p: usize, pixels: &[u32; LANES]) {
+        for i in (0..LANES).filter(|i| self.tile.hit[p] >> i & 1 == 1) {
+            let (owner, material) = (self.tile.owners[p][i], self.tile.materials[p][i]);
+            self.sums.add_to_mattes(self.plan, pixels[i] as usize, owner.primitive, material);
+        }
+    }
+
+    /// Spreads what some tiles cost over their samples.
+    fn add_cost(&mut self, summed: &Summed) {
+        let share = 1.0 / summed.count as f64;
+        let all = |counts: &[u64]| counts.iter().sum::<u64>() as f64 * share;
+        let (boxes, lanes) = (summed.tests.boxes as f64 * share, all(&summed.rays.packets) * LANES as f64);
+        let cost = [boxes, all(&summed.tests.kinds), all(&summed.rays.rays), lanes];
+        for pixel in summed.pixels.iter().flatten().take(summed.count) {
+            let sum = &mut self.sums.cost[*pixel as usize];
+            *sum = std::array::from_fn(|k| sum[k] + cost[k]);
+        }
+    }
+}
+
+impl Record for LayerTape<'_, '_> {
+    const ON: bool = Silent::ON;
+    fn tile(&mut self, _: usize, _: &mut dyn Iterator<Item = (i32, i32, u32)>) {}
+    fn ray(&mut self, _: RayKind, _: Ray, _: Option<u32>, _: f32, _: usize, _: u32) {}
+    fn shadow(&mut self, _: usize, _: Ray, _: bool, _: usize, _: u32) {}
+    fn lit(&mut self, _: usize, _: usize, _: u32) {}
+    fn texture(&mut self, _: usize, _: i64, _: usize, _: u32) {}
+
+    const SURFACES: bool = true;
+
+    fn surface(&mut self, seen: &Seen) {
+        let (p, tile) = (seen.packet, &mut self.tile);
+        let dir = seen.rays.dir;
+        tile.hit[p] = seen.hit;
+        tile.normal[p] = seen.normal;
+        tile.albedo[p] = seen.bsdf.reflectance();
+        (tile.t[p], tile.rows[p]) = (seen.rays.t_max, seen.rows);
+        tile.depth[p] = seen.rays.t_max
+            * match self.axis {
+                Some(axis) => dir.dot(Vec3x8::splat(axis)),
+                None => dir.length(),
+            };
+        (tile.owners[p], tile.materials[p]) = (*seen.owners, *seen.materials);
+    }
+
+    fn taken(&mut self, taken: &Taken) {
+        for p in 0..taken.count.div_ceil(LANES) {
+            let (count, pixels) = (LANES.min(taken.count - p * LANES), &taken.pixels[p]);
+            let hit = self.tile.hit[p];
+            if !self.sums.normal.is_empty() {
+                Self::add_filtered(&mut self.sums.normal, &self.tile.normal[p], hit, pixels);
+            }
+            if !self.sums.albedo.is_empty() {
+                Self::add_filtered(&mut self.sums.albedo, &self.tile.albedo[p], hit, pixels);
+            }
+            if !self.sums.near.is_empty() {
+                self.add_near(p, count, taken);
+            }
+            if self.sums.want_mattes() {
+                self.add_to_mattes(p, pixels);
+            }
+        }
+        self.tile.hit = [0; PACKETS];
+    }
+
+    fn summed(&mut self, summed: &Summed) {
+        if self.sums.want_variance() {
+            self.add_radiance(summed);
+        }
+        if self.plan.layers.has(Aov::Cost) && summed.count > 0 {
+            self.add_cost(summed);
+        }
+    }
+}
+
+/// The point in the world and the texture coordinates that the nearest sample of a pixel sees, in f64 from its ray
+/// before that was rounded.
+fn place(frame: &Frame, (x, y): (i32, i32), near: &Near) -> (DVec3, DVec2) {
+    let mut samples = Samples8::default();
+    samples.set(0, (x, y), frame.rays.pattern(x, y), near.sample);
+    let (origin, dir) = frame.rays.exact(&samples).lane(0);
+    let ray = Ray64 { origin, dir, t_min: 0.0, t_max: f64::INFINITY };
+    let stores = frame.tree.stores();
+    let found = stores.refine(near.row, &ray, f64::from(near.t));
+    let point = found.map_or(origin + dir * f64::from(near.t), |found| found.point);
+    let owner = Owner { primitive: near.primitive, material: near.material };
+    let uv = attributes::uv(&frame.plan, stores, near.row, owner, point);
+    (point + frame.plan.origin, uv)
+}
