@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 pub mod accel;
+pub mod batch;
 pub mod film;
 pub mod integrate;
 pub mod lanes;

@@ -1,9 +1,9 @@
 //! Layers beside the colour, and windows, as options.
 
 use clap::{Args, ValueEnum};
-use octray::Renderer;
+use octray::batch::{LayerChoice, Overscan, WindowChoice};
 use octray::film::Window;
-use octray::scene::{Aov, Layers, Scene};
+use octray::scene::Layers;
 
 use super::args;
 use super::exit::{Exit, Failure};
@@ -49,63 +49,31 @@ pub struct Windows {
     overscan: Option<Overscan>,
 }
 
-/// What is added on each side.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Overscan {
-    Pixels(u32),
-    Percent(f64),
-}
-
 /// Most pixels beyond a side, as many as along one.
 const MOST_OVERSCAN: u32 = 65_536;
 
 impl LayerArgs {
-    /// The layers of a render.
-    pub fn layers(&self, scene: &Scene) -> Result<Layers, Failure> {
-        let start = if self.aov.is_empty() { scene.layers } else { Layers::default() };
-        let named = self.aov.iter().try_fold(start, |layers, name| layers.with_named(name.trim()));
-        let mut layers = named.map_err(|unknown| Failure::new(Exit::Usage, format!("--aov: {unknown}")))?;
-        layers.ranks = self.crypto_ranks.unwrap_or(scene.layers.ranks);
-        layers.instances = self.instances.map_or(scene.layers.instances, |how| how == Instances::Each);
-        Ok(if self.cost { layers.with(Aov::Cost) } else { layers })
+    /// As the library takes them.
+    ///
+    /// # Errors
+    /// Names that are none.
+    pub fn choice(&self) -> Result<LayerChoice, Failure> {
+        let choice = LayerChoice {
+            aovs: self.aov.iter().map(|name| name.trim().to_owned()).collect(),
+            cost: self.cost,
+            ranks: self.crypto_ranks,
+            instances: self.instances.map(|how| how == Instances::Each),
+        };
+        choice.check().map_err(|unknown| Failure::new(Exit::Usage, format!("--aov: {unknown}")))?;
+        Ok(choice)
     }
 }
 
 impl Windows {
-    /// Whether the user chose what part of the picture there is.
-    pub fn is_crop(&self) -> bool {
-        self.crop.is_some() || self.crop_ndc.is_some()
+    /// As the library takes them.
+    pub fn choice(&self) -> WindowChoice {
+        WindowChoice { crop: self.crop, crop_ndc: self.crop_ndc, overscan: self.overscan }
     }
-
-    /// Sets the windows of a renderer.
-    pub fn apply<'s>(&self, renderer: Renderer<'s>) -> Renderer<'s> {
-        let display = (renderer.image().width, renderer.image().height);
-        let mut renderer = renderer;
-        if let Some(overscan) = self.overscan {
-            renderer = renderer.overscan(overscan.pixels(display));
-        }
-        match self.crop.or_else(|| self.crop_ndc.map(|corners| of_shares(corners, display))) {
-            Some(window) => renderer.crop(window),
-            None => renderer,
-        }
-    }
-}
-
-impl Overscan {
-    fn pixels(self, (width, height): (u32, u32)) -> [u32; 2] {
-        match self {
-            Overscan::Pixels(pixels) => [pixels; 2],
-            Overscan::Percent(percent) => {
-                [width, height].map(|side| (f64::from(side) * percent / 100.0).round() as u32)
-            }
-        }
-    }
-}
-
-/// Pixels whose centres lie within the shares.
-fn of_shares([x0, y0, x1, y1]: [f64; 4], (width, height): (u32, u32)) -> Window {
-    let pixel = |share: f64, side: u32| (share * f64::from(side)).round() as i32;
-    Window { x0: pixel(x0, width), y0: pixel(y0, height), x1: pixel(x1, width), y1: pixel(y1, height) }
 }
 
 fn ndc(text: &str) -> Result<[f64; 4], String> {
@@ -146,10 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn shares_of_a_picture_are_whole_pixels() {
-        let halves = [[0.0, 0.0, 0.5, 1.0], [0.5, 0.0, 1.0, 1.0]].map(|corners| of_shares(corners, (101, 50)));
-        assert_eq!(halves[0], Window { x0: 0, y0: 0, x1: 51, y1: 50 });
-        assert_eq!(halves[1], Window { x0: 51, y0: 0, x1: 101, y1: 50 });
+    fn shares_are_read_or_explained() {
         assert_eq!(ndc("0, 0,0.5,1"), Ok([0.0, 0.0, 0.5, 1.0]));
         for text in ["", "0,0,1", "0,0,0,1", "0,0,nan,1", "0,0,inf,1"] {
             assert!(ndc(text).is_err(), "{text}");

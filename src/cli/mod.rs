@@ -6,23 +6,26 @@
 //!
 //! | file | what it is about |
 //! |---|---|
-//! | `render`, `info`, `check`, `compare`, `query`, `convert`, `merge`, `manual` | one command each (`manual`: two) |
-//! | `args`, `atoms`, `frames` | words that several commands understand |
+//! | `render`, `batch`, `info`, `check`, `compare`, `query`, `convert`, `merge`, `manual` | one command each (`manual`: two) |
+//! | `args`, `atoms`, `settings` | words that several commands understand |
+//! | `jobs` | running what `render` and `batch` put on a list |
 //! | `scene_file`, `pictures`, `hits` | files in and out |
 //! | `console`, `progress`, `stats_json` | what is said, to people and machines |
 //! | `cpu`, `system`, `signals`, `exit` | the world around the process |
 
 mod args;
 mod atoms;
+mod batch;
 mod check;
 mod compare;
 mod console;
 mod convert;
 pub mod cpu;
 mod exit;
-mod frames;
+mod extras;
 mod hits;
 mod info;
+mod jobs;
 mod layers;
 mod manual;
 mod merge;
@@ -32,6 +35,7 @@ mod progress;
 mod query;
 mod render;
 mod scene_file;
+mod settings;
 mod signals;
 mod stats_json;
 mod system;
@@ -79,8 +83,10 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Render a scene to an EXR or PNG file
+    /// Render scenes to EXR or PNG files
     Render(Box<render::Args>),
+    /// Render a list of pictures: what is missing or stale
+    Batch(Box<batch::Args>),
     /// Say what a scene holds and what it takes
     Info(info::Args),
     /// Check the engine against the f64 reference on a scene
@@ -161,6 +167,16 @@ impl Run {
         Ok(self.signals.undisturbed(|| aside::check(path))?)
     }
 
+    /// The same for something that is done quietly.
+    fn hushed(&self) -> Run {
+        Run {
+            start: self.start,
+            console: Console { quiet: true, ..self.console },
+            signals: self.signals.clone(),
+            color_space: self.color_space,
+        }
+    }
+
     /// Says what makes this build slow, before work that takes time.
     fn warn_of_build(&self) {
         cpu::warnings().iter().for_each(|warning| self.console.warn(warning));
@@ -184,13 +200,15 @@ pub fn run() -> ExitCode {
     };
     let (console, color_space) = (Console::new(cli.messages(), cli.quiet), cli.primaries());
     let run = Run { start, console, signals: Signals::watch(), color_space };
-    let writes_exr = matches!(cli.command, Command::Render(_) | Command::Convert(_) | Command::Merge(_));
+    let writes_exr =
+        matches!(cli.command, Command::Render(_) | Command::Batch(_) | Command::Convert(_) | Command::Merge(_));
     if run.color_space.is_some() && !writes_exr {
         run.console.error("--color rec709 and acescg are about EXR files, and this command writes none");
         return ExitCode::from(Exit::Usage as u8);
     }
     let result = match &cli.command {
         Command::Render(args) => render::run(args, &run),
+        Command::Batch(args) => batch::run(args, &run),
         Command::Info(args) => info::run(args, &run),
         Command::Check(args) => check::run(args, &run),
         Command::Compare(args) => compare::run(args, &run),

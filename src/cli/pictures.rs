@@ -115,19 +115,6 @@ impl Target {
         Ok(Target::File(path.into(), format))
     }
 
-    /// Whether it holds more than what a display shows.
-    pub fn is_exr(&self) -> bool {
-        self.format() == Format::Exr
-    }
-
-    /// The name of a file beside it: its own with another ending. None beside standard output.
-    pub fn beside(&self, ending: &str) -> Option<PathBuf> {
-        match self {
-            Target::File(path, _) => Some(path.with_extension(ending)),
-            Target::Stdout => None,
-        }
-    }
-
     fn format(&self) -> Format {
         match self {
             Target::File(_, format) => *format,
@@ -254,13 +241,20 @@ pub fn write_bytes(path: &Path, bytes: &[u8], run: &Run) -> Result<(), Failure> 
     Ok(run.signals.undisturbed(|| aside::write_while(path, bytes, || !run.signals.is_caught()))?)
 }
 
-/// A PNG clamps bright light by its nature; everything else is worth a word.
 fn tell(losses: Losses, target: &Target, run: &Run) {
+    let texts = self::losses(losses, target.format() == Format::Exr);
+    texts.iter().for_each(|text| run.console.warn(&format!("{target}: {text}")));
+}
+
+/// What a format could not hold, in words. A PNG clamps bright light by its nature; everything else is worth a word.
+pub fn losses(losses: Losses, is_exr: bool) -> Vec<String> {
+    let mut texts = Vec::new();
     if losses.dropped > 0 {
-        run.console.warn(&format!("{target}: {} samples are not finite and became 0", losses.dropped));
+        texts.push(format!("{} samples are not finite and became 0", losses.dropped));
     }
-    if losses.clamped > 0 && target.format() == Format::Exr {
+    if losses.clamped > 0 && is_exr {
         let most = "the largest 16-bit number, 65504";
-        run.console.warn(&format!("{target}: {} samples became {most}: --float keeps them", losses.clamped));
+        texts.push(format!("{} samples became {most}: --float keeps them", losses.clamped));
     }
+    texts
 }

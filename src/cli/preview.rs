@@ -2,47 +2,44 @@
 
 use std::io;
 use std::net::{TcpStream, ToSocketAddrs};
+use std::path::PathBuf;
 use std::sync::mpsc::{self, Receiver, Sender};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+use octray::Renderer;
+use octray::batch::Job;
 use octray::film::Window;
-use octray::render::{Progress, Rendering, Task, Traced};
+use octray::output::Format;
+use octray::render::{Rendering, Task, Traced};
 use tev_client::{PacketCreateImage, PacketUpdateImage, TevClient};
 
 use super::Run;
-use super::progress::Bar;
+use super::pictures::{self, Target};
 
 /// A viewer that takes nothing for so long is given up.
 const PATIENCE: Duration = Duration::from_secs(5);
 const CHANNELS: [&str; 4] = ["R", "G", "B", "A"];
 
-/// What goes on beside a render.
+/// What goes on beside a single render.
 pub struct Preview<'a> {
-    bar: Bar,
-    tev: Option<Tev>,
+    host: Option<&'a str>,
+    tev: OnceLock<Option<Tev>>,
     run: &'a Run,
     start: Instant,
     so_far: Mutex<Vec<Traced>>,
-    /// Writes an unfinished picture.
-    write: &'a (dyn Fn(&Rendering) + Sync),
 }
 
 impl<'a> Preview<'a> {
-    /// With a bar; `write` is called on one of the threads that render when SIGUSR1 came.
-    pub fn new(run: &'a Run, bar: Bar, tev: Option<Tev>, write: &'a (dyn Fn(&Rendering) + Sync)) -> Self {
-        Preview { bar, tev, run, start: Instant::now(), so_far: Mutex::default(), write }
-    }
-}
-
-impl Progress for Preview<'_> {
-    fn advance(&self, done: u64, total: u64) {
-        self.bar.advance(done, total);
+    /// With the viewer that the user asked for.
+    pub fn new(run: &'a Run, host: Option<&'a str>) -> Self {
+        Preview { host, tev: OnceLock::new(), run, start: Instant::now(), so_far: Mutex::default() }
     }
 
-    fn block(&self, task: &Task, traced: &Traced) {
-        if let Some(tev) = &self.tev {
+    /// Shows a block, and writes what there is so far where SIGUSR1 came.
+    pub fn block(&self, job: &Job, renderer: &Renderer, task: &Task, traced: &Traced) {
+        if let Some(tev) = self.tev.get_or_init(|| self.open(job, renderer)) {
             let (window, pixels) = task.pixels(traced);
             tev.show(window, pixels);
         }
@@ -51,7 +48,33 @@ impl Progress for Preview<'_> {
         if self.run.signals.is_asked() {
             let blocks = so_far.clone();
             drop(so_far);
-            (self.write)(&task.finish(blocks, 0, self.start));
+            self.write(job, renderer, &task.finish(blocks, 0, self.start));
+        }
+    }
+
+    /// A render goes on without a viewer that does not answer.
+    fn open(&self, job: &Job, renderer: &Renderer) -> Option<Tev> {
+        let (host, window) = (self.host?, renderer.window().ok()?);
+        let told = |error: io::Error| {
+            self.run.console.warn(&format!("--tev {host}: {error}: rendering without a viewer"));
+        };
+        Tev::open(host, &job.to_string(), window).map_err(told).ok()
+    }
+
+    /// Writes what there is so far beside the target, whose own name stays that of a whole picture.
+    fn write(&self, job: &Job, renderer: &Renderer, unfinished: &Rendering) {
+        let ending = if job.format == Format::Exr { "partial.exr" } else { "partial.png" };
+        let name = match job.output.as_os_str() == "-" {
+            true => PathBuf::from("octray.partial.exr"),
+            false => job.output.with_extension(ending),
+        };
+        let description = job.description(renderer, &unfinished.stats, None, None);
+        let written = Target::new(&name, &[&job.scene], self.run).and_then(|target| {
+            pictures::write(&unfinished.picture, &target, job.settings.options, &description, self.run)
+        });
+        match written {
+            Ok(()) => self.run.console.note(&format!("{}: the picture so far", name.display())),
+            Err(failure) => self.run.console.warn(&failure.message),
         }
     }
 }
@@ -109,7 +132,7 @@ impl Preview<'_> {
     /// Ends it, with a warning where the viewer went away.
     pub fn finish(self) {
         let Preview { tev, run, .. } = self;
-        let Some(mut tev) = tev else { return };
+        let Some(mut tev) = tev.into_inner().flatten() else { return };
         if let Err(error) = tev.close() {
             run.console.warn(&format!("--tev {}: the viewer went away: {error}", tev.host));
         }

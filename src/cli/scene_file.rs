@@ -5,21 +5,15 @@ use std::time::Instant;
 
 use clap::Args;
 use octray::Scene;
+use octray::batch::memory;
 use octray::scene::particles::Format;
-use octray::scene::{CloudShapes, Filter, Frames, ImageSettings, SceneErrors, Shape};
+use octray::scene::{Filter, Frames, ImageSettings, SceneErrors};
 
 use super::Run;
 use super::atoms::Atoms;
 use super::exit::{Exit, Failure};
 use super::system;
 
-/// Memory that a build takes for a sphere on top of the scene, in bytes: parts, boxes, tree and columns
-/// together at their most (measured on a million: 360).
-const SPHERE_BYTES: usize = 400;
-/// The same for a corner of a polygon (measured on a million triangles: 185).
-const CORNER_BYTES: usize = 200;
-/// The same for every other primitive (measured on a million disks: 420).
-const OTHER_BYTES: usize = 600;
 /// Samples per pixel of a scene without an image, as in scene files.
 const SPP: u32 = 16;
 
@@ -49,12 +43,18 @@ impl Moment {
 
 /// The frames of a scene file.
 pub fn frames(path: &Path, atoms: &Atoms, resolution: Option<(u32, u32)>) -> Result<Frames, Failure> {
+    check_look(path, atoms)?;
+    Ok(Frames::new(path).look(atoms.look()).resolution(resolution))
+}
+
+/// Makes sure that what atoms look like is said of a file of atoms.
+pub fn check_look(path: &Path, atoms: &Atoms) -> Result<(), Failure> {
     if atoms.is_given() && Format::of(path).is_none() {
         let text =
             "--style, --radius, --color-by, --bonds and --replicate are for files of atoms; a scene says it itself";
         return Err(Failure::new(Exit::Usage, text).of(path));
     }
-    Ok(Frames::new(path).look(atoms.look()).resolution(resolution))
+    Ok(())
 }
 
 /// Reads a frame and shows its warnings.
@@ -69,18 +69,7 @@ pub fn load(frames: &mut Frames, path: &Path, frame: i64, run: &Run) -> Result<L
 
 /// Makes sure that a tree can be built, and so many bytes more taken.
 pub fn need_memory(scene: &Scene, more: u64, work: &str) -> Result<(), Failure> {
-    let objects = scene.objects.iter().map(|object| match &object.shape {
-        Shape::Sphere(_) => SPHERE_BYTES,
-        Shape::Polygon(polygon) => CORNER_BYTES * polygon.corners.len(),
-        Shape::Plane(_) | Shape::Disk(_) | Shape::Box(_) | Shape::Cylinder(_) | Shape::Cone(_) => OTHER_BYTES,
-    });
-    let clouds = scene.clouds.iter().map(|cloud| match &cloud.shapes {
-        CloudShapes::Spheres(rows) => SPHERE_BYTES * rows.len(),
-        CloudShapes::Polygons { corners, .. } => CORNER_BYTES * corners.len(),
-        CloudShapes::Disks(_) | CloudShapes::Boxes(..) | CloudShapes::Cylinders(..) => OTHER_BYTES * cloud.len(),
-    });
-    let build: usize = objects.chain(clouds).sum();
-    system::need_memory((build as u64).saturating_add(more), work)
+    system::need_memory(memory::to_build(scene).saturating_add(more), work)
 }
 
 /// Gives the picture another size, or a scene without a picture its first.
@@ -91,7 +80,7 @@ pub fn resize(scene: &mut Scene, resolution: Option<(u32, u32)>) {
 }
 
 /// All errors with the lines they are in; where a file as a whole is wrong, one line.
-fn failure(path: &Path, errors: &SceneErrors, color: bool) -> Failure {
+pub fn failure(path: &Path, errors: &SceneErrors, color: bool) -> Failure {
     let lone = errors.iter().next().filter(|error| errors.len() == 1 && error.span.is_none());
     if let Some(error) = lone {
         return Failure::new(Exit::Input, error);

@@ -1,5 +1,6 @@
 //! SIGINT and SIGTERM: stop at once, but never in the middle of writing a file.
 //!
+//! Batches look for signals themselves: they stop within a block of pixels, and have a second and a half for it.
 //! Nothing but a file in the making has to be cleared away, so the first signal ends the process from a
 //! thread of its own, whatever the others are doing (loading, building, tracing), within a tenth of a
 //! second. A file that is being written is given up first, or finished where it is nearly done: it
@@ -11,9 +12,10 @@ use std::process;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use indicatif::ProgressBar;
+use octray::output::aside;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
@@ -21,6 +23,8 @@ use super::console;
 
 /// How often the thread looks up. A flag that is looked at works on every system.
 const PERIOD: Duration = Duration::from_millis(50);
+/// How long work may take that stops by itself.
+const PATIENCE: Duration = Duration::from_millis(1500);
 
 /// The watch over signals.
 #[derive(Debug, Clone, Default)]
@@ -31,6 +35,8 @@ pub struct Signals {
     writing: Arc<Mutex<()>>,
     /// SIGUSR1 came: somebody wants to see how far it is.
     asked: Arc<AtomicBool>,
+    /// Set while the work stops by itself when a signal came.
+    graceful: Arc<AtomicBool>,
     /// To be cleared before the last message.
     bar: Arc<OnceLock<ProgressBar>>,
 }
@@ -40,7 +46,7 @@ impl Signals {
     pub fn watch() -> Self {
         let signals = Signals::default();
         let watch = signals.clone();
-        if thread::Builder::new().spawn(move || watch.wait()).is_err() {
+        if thread::Builder::new().spawn(move || -> () { watch.wait() }).is_err() {
             return signals;
         }
         #[cfg(unix)]
@@ -67,6 +73,20 @@ impl Signals {
         result
     }
 
+    /// Does something that stops by itself soon after a signal came, and clears away what it made; if it does not, the
+    /// process ends all the same.
+    pub fn graceful<T>(&self, work: impl FnOnce() -> T) -> T {
+        self.graceful.store(true, Ordering::Relaxed);
+        let result = work();
+        self.graceful.store(false, Ordering::Relaxed);
+        result
+    }
+
+    /// Ends the process as the signal that came wants it.
+    pub fn end(&self) -> ! {
+        self.finish(self.caught.load(Ordering::Relaxed) as i32)
+    }
+
     /// Whether a signal came, and what takes long should be given up.
     pub fn is_caught(&self) -> bool {
         self.caught.load(Ordering::Relaxed) != 0
@@ -82,7 +102,7 @@ impl Signals {
         let _ = self.bar.set(bar.clone());
     }
 
-    fn wait(&self) {
+    fn wait(&self) -> ! {
         let signal = loop {
             thread::sleep(PERIOD);
             match self.caught.load(Ordering::Relaxed) {
@@ -90,7 +110,16 @@ impl Signals {
                 signal => break signal as i32,
             }
         };
+        let caught = Instant::now();
+        while self.graceful.load(Ordering::Relaxed) && caught.elapsed() < PATIENCE {
+            thread::sleep(PERIOD);
+        }
+        self.finish(signal)
+    }
+
+    fn finish(&self, signal: i32) -> ! {
         let _held = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
+        aside::abandon();
         if let Some(bar) = self.bar.get() {
             bar.finish_and_clear();
         }

@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use octray::accel::Counts;
+use octray::batch::{Job, Report};
 use octray::integrate::RayKind;
 use octray::plan::Kind;
-use octray::render::{IdNames, Stats};
+use octray::render::{Engine, IdNames, Stats};
 use serde_json::{Map, Value, json};
 
 use super::console::pretty;
@@ -94,6 +95,55 @@ pub fn add_names(stats: &mut Map<String, Value>, names: &IdNames) {
     if *names != IdNames::default() {
         stats.insert("ids".to_owned(), json!({ "object": table(&names.object), "material": table(&names.material) }));
     }
+}
+
+/// What jobs did: of a single one, or with one entry a job in `frames`.
+pub fn of_jobs(jobs: &[Job], reports: &[(usize, Report)], many: bool, run: &Run) -> Map<String, Value> {
+    let one = |(index, report): &(usize, Report), with: &mut Map<String, Value>| {
+        add_render(with, &report.stats, jobs[*index].settings.engine == Engine::Reference);
+        add_names(with, &report.names);
+    };
+    let seconds = |report: &Report| Seconds {
+        load: report.load_seconds,
+        plan: report.stats.plan_seconds,
+        build: report.stats.build_seconds,
+        trace: report.stats.trace_seconds,
+        write: report.write_seconds,
+    };
+    let mut sum = Seconds::default();
+    for (_, report) in reports {
+        let Seconds { load, plan, build, trace, write } = seconds(report);
+        sum.load += load;
+        sum.plan += plan;
+        sum.build += build;
+        sum.trace += trace;
+        sum.write += write;
+    }
+    let most = |bytes: fn(&Report) -> usize| reports.iter().map(|(_, report)| bytes(report)).max().unwrap_or(0);
+    let mut stats = common(run, reports.first().map_or(0, |(_, report)| report.stats.threads), &sum);
+    if let ([report], false) = (reports, many) {
+        one(report, &mut stats);
+    }
+    add_memory(&mut stats, most(|report| report.stats.column_bytes), most(|report| report.stats.tree_bytes));
+    if many {
+        let frame = |entry: &(usize, Report)| {
+            let (job, report) = (&jobs[entry.0], &entry.1);
+            let Seconds { load, plan, build, trace, write } = seconds(report);
+            let mut frame = Map::new();
+            frame.insert("frame".to_owned(), json!(job.frame()));
+            frame.insert("scene".to_owned(), json!(job.scene.display().to_string()));
+            frame.insert("output".to_owned(), json!(job.to_string()));
+            frame.insert("bytes".to_owned(), json!(report.bytes));
+            frame.insert("hash".to_owned(), json!(report.hash));
+            let seconds = json!({ "load": load, "plan": plan, "build": build, "trace": trace, "write": write });
+            frame.insert("seconds".to_owned(), seconds);
+            frame.insert("clamped".to_owned(), json!(report.losses.clamped));
+            one(entry, &mut frame);
+            Value::Object(frame)
+        };
+        stats.insert("frames".to_owned(), reports.iter().map(frame).collect());
+    }
+    stats
 }
 
 /// Writes them.

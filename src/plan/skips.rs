@@ -50,6 +50,12 @@ impl Skip {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SkipSet(u32);
 
+impl Default for SkipSet {
+    fn default() -> Self {
+        SkipSet::ALL
+    }
+}
+
 impl SkipSet {
     /// Everything that is not needed.
     pub const ALL: SkipSet = SkipSet(!0);

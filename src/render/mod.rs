@@ -26,7 +26,7 @@ use crate::film::{Picture, Window};
 use crate::integrate::{CameraRays, Direct, RayCounts, Record};
 use crate::output::{self, Description, Losses, Options, OutputError};
 use crate::plan::{InvalidScene, Plan, SkipSet, validate};
-use crate::scene::{Camera, ImageSettings, Layers, Scene};
+use crate::scene::{Camera, ImageSettings, Integrator, Layers, Scene};
 
 /// Which tracer finds the hits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -114,6 +114,7 @@ pub struct Renderer<'s> {
     next: Option<&'s Scene>,
     window: Option<Window>,
     overscan: [u32; 2],
+    integrator: Integrator,
     max_depth: u32,
     seed: u64,
     threads: usize,
@@ -148,15 +149,25 @@ impl<'s> Renderer<'s> {
     /// # Errors
     /// No camera or image size; a scene that was made by hand and breaks a rule.
     pub fn new(scene: &'s Scene) -> Result<Self, RenderError> {
+        let camera = scene.camera(None);
+        Renderer::seen_from(scene, camera.ok_or(RenderError::NoCamera)?)
+    }
+
+    /// The scene's own settings, seen from a camera that need not be one of the scene's.
+    ///
+    /// # Errors
+    /// No image size; a scene that was made by hand and breaks a rule.
+    pub fn seen_from(scene: &'s Scene, camera: &'s Camera) -> Result<Self, RenderError> {
         validate(scene)?;
         Ok(Renderer {
             scene,
-            camera: scene.camera(None).ok_or(RenderError::NoCamera)?,
+            camera,
             image: scene.image.clone().ok_or(RenderError::NoImage)?,
             layers: scene.layers,
             next: None,
             window: None,
             overscan: [0; 2],
+            integrator: scene.render.integrator,
             max_depth: scene.render.max_depth,
             seed: scene.render.seed,
             threads: 0,
@@ -211,6 +222,12 @@ impl<'s> Renderer<'s> {
     /// Only the pixels of a window: the same bits as in the whole picture.
     pub fn crop(mut self, window: Window) -> Self {
         self.window = Some(window);
+        self
+    }
+
+    /// How light is found.
+    pub fn integrator(mut self, integrator: Integrator) -> Self {
+        self.integrator = integrator;
         self
     }
 
@@ -328,7 +345,7 @@ impl<'s> Renderer<'s> {
 }
 
 /// So many threads; 0: as many as there are cores for this process.
-fn pool(threads: usize) -> Result<ThreadPool, RenderError> {
+pub(crate) fn pool(threads: usize) -> Result<ThreadPool, RenderError> {
     let threads = match threads {
         0 => std::thread::available_parallelism().map_or(1, usize::from),
         threads => threads,

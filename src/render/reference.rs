@@ -37,7 +37,7 @@ impl Rows {
     pub fn new(renderer: &Renderer, window: Window) -> Self {
         let start = Instant::now();
         let tracer = Reference::relative_to(renderer.scene, renderer.camera.eye);
-        let integrator = renderer.scene.render.integrator;
+        let integrator = renderer.integrator;
         let settings = RenderSettings { integrator, max_depth: renderer.max_depth, seed: renderer.seed };
         let view = tracer.view(renderer.camera, &renderer.image, &settings);
         Rows { tracer, view, window, origin: renderer.camera.eye, plan_seconds: start.elapsed().as_secs_f64() }

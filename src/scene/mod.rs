@@ -16,6 +16,7 @@ mod fit;
 mod frames;
 mod hash;
 mod image;
+pub mod inputs;
 mod layers;
 mod light;
 mod material;

@@ -1,19 +1,19 @@
-//! Frames of an animation, and the names of their pictures.
-
-use std::path::{Path, PathBuf};
-
-use octray::scene::pattern;
-
-use super::exit::{Exit, Failure};
+//! Frames of an animation, as people write them.
 
 /// Most frames of one command.
 const MOST_FRAMES: usize = 1_000_000;
 
 /// Frames in the order in which they are rendered, none twice.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct FrameList(pub Vec<i64>);
+pub struct FrameList(
+    /// Their numbers.
+    pub Vec<i64>,
+);
 
 /// `1-100`, `1-100x2`, `1,5,10-20`, `-5--1`; commas or blanks between them. Backwards where the second one is less.
+///
+/// # Errors
+/// What would be right.
 ///
 /// Source: The Foundry, Nuke manual, "Defining frame ranges"; the documentation of Fileseq.
 pub fn list(text: &str) -> Result<FrameList, String> {
@@ -46,19 +46,6 @@ fn range(part: &str) -> Option<(i64, i64, i64)> {
     Some((first, last, step.filter(|step| *step > 0)?))
 }
 
-/// The name of a frame's picture. A name without a place for the number serves one frame alone.
-pub fn output(name: &Path, frame: i64, many: bool) -> Result<PathBuf, Failure> {
-    let text = name.to_string_lossy();
-    match pattern::name(&text, frame) {
-        Some(name) => Ok(PathBuf::from(name)),
-        None if many => {
-            let text = "has no place for the number of the frame: say it like out.####.exr, or give --out-dir";
-            Err(Failure::new(Exit::Usage, text).of(name))
-        }
-        None => Ok(name.to_owned()),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -76,13 +63,5 @@ mod tests {
             assert!(frames(text).is_err(), "{text}");
         }
         assert!(frames("1-1000001").unwrap_err().contains("at most"));
-    }
-
-    #[test]
-    fn a_range_needs_a_place_for_its_number() {
-        let name = |text: &str, many| output(Path::new(text), 12, many).map_err(|failure| failure.exit);
-        assert_eq!(name("out/a.####.exr", true), Ok(PathBuf::from("out/a.0012.exr")));
-        assert_eq!(name("a.exr", false), Ok(PathBuf::from("a.exr")));
-        assert_eq!(name("a.exr", true), Err(Exit::Usage));
     }
 }

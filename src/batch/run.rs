@@ -1,0 +1,396 @@
+//! Who does what, and when.
+//!
+//! As many workers as threads take jobs in order. A worker traces its picture block by block in a way that lets the
+//! others help: a picture that is small is done before anybody could, one that is large keeps all of them busy, and
+//! when the list is empty those without a job help with what is left, so that no core idles before the last block.
+//! While a large picture is traced by all, nobody opens another one; while one is read or built, others are.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use rayon::prelude::*;
+
+use super::memory::{self, forecast};
+use super::source::Ticket;
+use super::write::{Finished, Room, Writer, line};
+use super::{Event, Job, JobError, Report, Shard, Sources, Watch, existing, ledger};
+use crate::output::exr::Encoded;
+use crate::output::{self, Format, OutputError, aside};
+use crate::render::{RenderError, Renderer, Rendering, Task, pool};
+use crate::scene::inputs::{Hashes, hex, sha256};
+use crate::scene::{Aov, Scene};
+
+/// Samples of a picture that is worth all threads: some tenths of a second.
+const LARGE: u64 = 1 << 22;
+/// Bytes that a pixel takes at the most: in its block and in the picture, or in the picture and as a file (measured,
+/// rounded up).
+const PIXEL_BYTES: u64 = 40;
+
+/// How a batch is run.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// Threads; 0: as many as there are cores for this process.
+    pub threads: usize,
+    /// Flush each file by itself at once, instead of in groups.
+    pub durable: bool,
+    /// Leave out jobs whose files are there, whole and up to date.
+    pub resume: bool,
+    /// Keep a record beside the outputs.
+    pub ledger: bool,
+    /// Most memory for scenes, trees and pictures, in bytes, as forecast.
+    pub max_memory: Option<u64>,
+    /// Which part of the list this is, for the files.
+    pub shard: Option<Shard>,
+}
+
+/// What a batch came to.
+#[derive(Debug, Default)]
+pub struct Summary {
+    /// Jobs whose files were written.
+    pub written: usize,
+    /// Jobs whose files were there already.
+    pub skipped: usize,
+    /// Jobs that failed, by their index, and why.
+    pub failed: Vec<(usize, JobError)>,
+    /// Jobs that were not begun, since no file can be written there, or since the batch was stopped.
+    pub left: usize,
+    /// Whether it was asked to stop.
+    pub cancelled: bool,
+}
+
+/// A batch on its way.
+struct Batch<'a> {
+    jobs: &'a [Job],
+    options: &'a Options,
+    watch: &'a dyn Watch,
+    sources: &'a Sources,
+    hashes: Mutex<Hashes>,
+    ledgers: Option<ledger::Ledgers>,
+    queue: Mutex<Queue>,
+    /// Samples of large pictures that wait for a thread.
+    large: AtomicU64,
+    /// Jobs done, in millionths.
+    done: AtomicU64,
+    stop: AtomicBool,
+    summary: Mutex<Summary>,
+    threads: usize,
+}
+
+#[derive(Default)]
+struct Queue {
+    next: usize,
+    open: usize,
+    bytes: u64,
+}
+
+/// What a worker is to do.
+enum Turn {
+    Job(usize, Ticket, u64),
+    Help,
+    End,
+}
+
+/// Runs all jobs, whatever becomes of single ones.
+///
+/// # Errors
+/// The threads could not be started.
+pub fn run(jobs: &[Job], options: &Options, sources: &Sources, watch: &dyn Watch) -> Result<Summary, RenderError> {
+    let pool = pool(options.threads)?;
+    sweep(jobs);
+    let batch = Batch {
+        jobs,
+        options,
+        watch,
+        sources,
+        hashes: Mutex::default(),
+        ledgers: options.ledger.then(|| ledger::Ledgers::open(jobs)),
+        queue: Mutex::default(),
+        large: AtomicU64::new(0),
+        done: AtomicU64::new(0),
+        stop: AtomicBool::new(false),
+        summary: Mutex::default(),
+        threads: pool.current_num_threads(),
+    };
+    let room = Room::default();
+    thread::scope(|scope| {
+        let (writer, inbox) = line(&room, options.durable);
+        let batch = &batch;
+        let write = thread::Builder::new().name("write".into()).spawn_scoped(scope, move || {
+            inbox.run(&|| false, &mut |job, result| batch.written(job, result));
+        });
+        write.map_err(|error| RenderError::Threads(error.to_string()))?;
+        pool.broadcast(|_| {
+            batch.work(&writer);
+        });
+        drop(writer);
+        Ok::<(), RenderError>(())
+    })?;
+    let mut summary = batch.summary.into_inner().unwrap_or_else(PoisonError::into_inner);
+    summary.cancelled = watch.cancelled();
+    summary.left = jobs.len() - summary.written - summary.skipped - summary.failed.len();
+    summary.failed.sort_by_key(|(job, _)| *job);
+    Ok(summary)
+}
+
+/// Clears away what dead processes left where files will be written.
+fn sweep(jobs: &[Job]) {
+    let mut folders: Vec<&Path> = jobs.iter().filter_map(|job| job.output.parent()).collect();
+    folders.sort_unstable();
+    folders.dedup();
+    for folder in folders {
+        aside::sweep(if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
+    }
+}
+
+impl Batch<'_> {
+    /// What one thread does until there is nothing left to begin.
+    fn work(&self, writer: &Writer<'_>) {
+        loop {
+            match self.turn() {
+                Turn::End => break,
+                Turn::Help => match rayon::yield_now() {
+                    Some(rayon::Yield::Executed) => {}
+                    _ => thread::sleep(Duration::from_micros(200)),
+                },
+                Turn::Job(index, ticket, bytes) => {
+                    let job = &self.jobs[index];
+                    let result = catch_unwind(AssertUnwindSafe(|| self.render(index, ticket, writer)));
+                    let mut queue = lock(&self.queue);
+                    queue.open -= 1;
+                    queue.bytes -= bytes;
+                    drop(queue);
+                    match result {
+                        Ok(Ok(())) => {}
+                        Ok(Err(JobError::Cancelled)) => {}
+                        Ok(Err(error)) => self.fail(index, error),
+                        Err(_) => self.fail(index, JobError::Mistake { path: job.scene.clone() }),
+                    }
+                }
+            }
+        }
+    }
+
+    /// The next job, where there is room and need for one.
+    fn turn(&self) -> Turn {
+        if self.stopped() {
+            return Turn::End;
+        }
+        let mut queue = lock(&self.queue);
+        let Some(job) = self.jobs.get(queue.next) else { return Turn::End };
+        if queue.open > 0 && self.large.load(Ordering::Relaxed) > LARGE {
+            return Turn::Help;
+        }
+        let bytes = match self.options.max_memory {
+            None => 0,
+            Some(limit) => {
+                let bytes = forecast(&job.scene, job.frame());
+                if queue.open > 0 && queue.bytes.saturating_add(bytes) > limit {
+                    return Turn::Help;
+                }
+                bytes
+            }
+        };
+        let index = queue.next;
+        queue.next += 1;
+        queue.open += 1;
+        queue.bytes += bytes;
+        Turn::Job(index, self.sources.ticket(job), bytes)
+    }
+
+    fn stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed) || self.watch.cancelled()
+    }
+
+    /// From the scene file to the bytes of the picture.
+    fn render(&self, index: usize, ticket: Ticket, writer: &Writer<'_>) -> Result<(), JobError> {
+        let job = &self.jobs[index];
+        let start = Instant::now();
+        if self.options.resume && self.is_recorded(job) {
+            self.skip(index);
+            return Ok(());
+        }
+        self.watch.event(&Event::FrameStart(index, job));
+        self.allow(job)?;
+        let loaded = self.sources.load(ticket);
+        let (scene, is_new) = loaded.map_err(|errors| JobError::Scene { path: job.scene.clone(), errors })?;
+        let load_seconds = if is_new { start.elapsed().as_secs_f64() } else { 0.0 };
+        if is_new {
+            scene.warnings.iter().for_each(|warning| self.warn(index, warning.to_string()));
+        }
+        let Some((mut rendering, description)) = self.picture(index, &scene)? else {
+            self.skip(index);
+            return Ok(());
+        };
+        if scene.background.transparent && !job.settings.windows.is_crop() && job.format == Format::Exr {
+            rendering.picture.trim();
+        }
+        self.watch.event(&Event::Traced(index, job, &rendering));
+        let encoding = Instant::now();
+        let encoded = output::encode(job.format, &rendering.picture, job.settings.options, &description);
+        let Encoded { bytes, losses, beside } =
+            encoded.map_err(|error| JobError::Encode { path: job.output.clone(), error })?;
+        let hash = self.ledgers.as_ref().map(|_| sha256(&mut bytes.as_slice()).map(|hash| hex(&hash)));
+        let hash = hash.and_then(Result::ok).unwrap_or_default();
+        let report = Report {
+            load_seconds,
+            write_seconds: encoding.elapsed().as_secs_f64(),
+            window: Some(rendering.picture.window),
+            spp: description.spp.unwrap_or_default(),
+            stats: rendering.stats,
+            names: rendering.names,
+            losses,
+            bytes: bytes.len() as u64,
+            hash,
+        };
+        let beside = beside.into_iter().map(|file| (job.output.with_file_name(&file.name), file.bytes)).collect();
+        writer.write(Finished { job: index, path: job.output.clone(), beside, bytes, report });
+        Ok(())
+    }
+
+    /// Whether the record of the batch has this very picture.
+    fn is_recorded(&self, job: &Job) -> bool {
+        let Some(ledgers) = &self.ledgers else { return false };
+        self.files_hash(job).is_some_and(|hash| existing::is_recorded(job, &hash, ledgers))
+    }
+
+    fn skip(&self, index: usize) {
+        lock(&self.summary).skipped += 1;
+        self.advance(1.0, index);
+        self.watch.event(&Event::Skipped(index, &self.jobs[index]));
+    }
+
+    /// Traces a picture with the help of whoever has nothing else to do; `None` where the file is there already.
+    fn picture(&self, index: usize, scene: &Scene) -> Result<Option<(Rendering, output::Description)>, JobError> {
+        let job = &self.jobs[index];
+        let failed = |error| match error {
+            RenderError::Cancelled => JobError::Cancelled,
+            error => JobError::Render { path: job.scene.clone(), error },
+        };
+        let next = self.next_frame(index, scene);
+        let mut renderer = job.renderer(scene).map_err(failed)?;
+        if let Some(next) = &next {
+            renderer = renderer.next_frame(next);
+        }
+        let scene_hash = renderer.scene_hash();
+        if self.options.resume && existing::is_current(job, &renderer, &scene_hash) {
+            return Ok(None);
+        }
+        self.room(scene, &renderer)?;
+        let task = Task::new(&renderer).map_err(failed)?;
+        let (start, total) = (Instant::now(), task.total());
+        self.large.fetch_add(total, Ordering::Relaxed);
+        let waiting = AtomicU64::new(total);
+        let stopped = || self.stopped();
+        let trace = |block| {
+            let samples = task.samples(block);
+            self.large.fetch_sub(samples, Ordering::Relaxed);
+            waiting.fetch_sub(samples, Ordering::Relaxed);
+            if self.stopped() {
+                return None;
+            }
+            let traced = task.trace(block, &stopped)?;
+            self.watch.event(&Event::Block(index, job, &renderer, &task, &traced));
+            self.advance(samples as f64 / total as f64, index);
+            Some(traced)
+        };
+        let traced: Option<Vec<_>> = (0..task.blocks()).into_par_iter().map(trace).collect();
+        self.large.fetch_sub(waiting.into_inner(), Ordering::Relaxed);
+        let rendering = task.finish(traced.ok_or(JobError::Cancelled)?, self.threads, start);
+        let shard = self.options.shard.map(|shard| shard.to_string());
+        let description = job.description(&renderer, &rendering.stats, Some(scene_hash), shard);
+        Ok(Some((rendering, description)))
+    }
+
+    /// The scene that motion leads to, where that is asked for.
+    fn next_frame(&self, index: usize, scene: &Scene) -> Option<Arc<Scene>> {
+        let job = &self.jobs[index];
+        let layers = job.settings.layers.layers(scene).ok()?;
+        if !layers.has(Aov::Motion) {
+            return None;
+        }
+        let frame = job.frame() + 1;
+        let ticket = self.sources.ticket(&Job { frame: Some(frame), ..job.clone() });
+        let told = |errors| self.warn(index, format!("{job}: motion is 0: there is no frame {frame}: {errors}"));
+        self.sources.load(ticket).map_err(told).ok().map(|(scene, _)| scene)
+    }
+
+    /// Refuses what would need more memory than was allowed, before it is read.
+    fn allow(&self, job: &Job) -> Result<(), JobError> {
+        let Some(limit) = self.options.max_memory else { return Ok(()) };
+        let pixels = job.settings.resolution.map_or(0, |(width, height)| u64::from(width) * u64::from(height));
+        let need = forecast(&job.scene, job.frame()).saturating_add(PIXEL_BYTES * pixels);
+        if need <= limit {
+            return Ok(());
+        }
+        let mib = |bytes: u64| bytes.div_ceil(1 << 20);
+        let scene = job.scene.display();
+        Err(JobError::Memory(format!(
+            "{scene}: about {} MiB of memory are needed, and the limit is {} MiB",
+            mib(need),
+            mib(limit)
+        )))
+    }
+
+    /// Makes sure that there is room for the tree and the picture, now that both are known.
+    fn room(&self, scene: &Scene, renderer: &Renderer<'_>) -> Result<(), JobError> {
+        let window = renderer.window().map_err(|error| JobError::Render { path: Default::default(), error })?;
+        let work = format!("a picture of {}x{} pixels", window.width(), window.height());
+        let pixels = PIXEL_BYTES.saturating_mul(window.area() as u64);
+        self.watch.room(memory::to_build(scene).saturating_add(pixels), &work).map_err(JobError::Memory)
+    }
+
+    /// A hash over all files that the scene of a job names.
+    fn files_hash(&self, job: &Job) -> Option<String> {
+        lock(&self.hashes).scene(&job.scene, job.frame()).ok()
+    }
+
+    /// Called when a file has its name, or will not get it.
+    fn written(&self, index: usize, result: Result<Report, OutputError>) {
+        let job = &self.jobs[index];
+        match result {
+            Ok(report) => {
+                if let Some(ledgers) = &self.ledgers {
+                    let hash = self.files_hash(job).unwrap_or_default();
+                    if let Err(error) = ledgers.add(job, &hash, &report) {
+                        self.warn(index, format!("the record of the batch cannot be written: {error}"));
+                    }
+                }
+                lock(&self.summary).written += 1;
+                self.watch.event(&Event::FrameDone(index, job, &report));
+            }
+            Err(error) => self.fail(index, error.into()),
+        }
+    }
+
+    fn fail(&self, index: usize, error: JobError) {
+        // Where nothing can be written, nothing else can either.
+        if let JobError::Output(OutputError::Io { source, .. }) = &error {
+            use std::io::ErrorKind::{PermissionDenied, ReadOnlyFilesystem, StorageFull};
+            if matches!(source.kind(), PermissionDenied | ReadOnlyFilesystem | StorageFull) {
+                self.stop.store(true, Ordering::Relaxed);
+            }
+        }
+        self.watch.event(&Event::Error(index, &self.jobs[index], &error));
+        lock(&self.summary).failed.push((index, error));
+    }
+
+    fn warn(&self, index: usize, text: String) {
+        self.watch.event(&Event::Warning(index, &self.jobs[index], text));
+    }
+
+    /// Some share of one job was done.
+    fn advance(&self, share: f64, index: usize) {
+        let more = (share * 1e6) as u64;
+        let done = self.done.fetch_add(more, Ordering::Relaxed) + more;
+        let all = (done as f64 / 1e6 / self.jobs.len() as f64).min(1.0);
+        self.watch.event(&Event::Progress(all, index, &self.jobs[index]));
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
