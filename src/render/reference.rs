@@ -95,11 +95,8 @@ fn add_layers(plan: &LayerPlan, sums: &mut Sums, index: usize, pixel: &Pixel) {
         }
         let Some(first) = &seen.first else { continue };
         let (primitive, material) = (first.primitive as u32, first.material as u32);
-        for (sums, value) in [(&mut sums.normal, first.normal), (&mut sums.albedo, first.albedo)] {
-            if let Some(sum) = sums.get_mut(index) {
-                *sum = (DVec3::from_array(*sum) + value).to_array();
-            }
-        }
+        sums.normal.add(index, first.normal);
+        sums.albedo.add(index, first.albedo);
         if sums.want_mattes() {
             sums.add_to_mattes(plan, index, primitive, material);
         }

@@ -11,6 +11,7 @@ use super::{Camera, Cuboid, Lens, Scene, Shape};
 pub fn carried(from: &Scene, to: &Scene, primitive: usize, point: DVec3) -> DVec3 {
     let (before, after) = (from.primitive(primitive), to.primitive(primitive));
     match (before, after) {
+        (Some(before), Some(after)) if before.shape == after.shape => None,
         (Some(before), Some(after)) => along(&before.shape, &after.shape, point).filter(|point| point.is_finite()),
         _ => None,
     }

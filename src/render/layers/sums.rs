@@ -6,6 +6,7 @@ use super::LayerPlan;
 use super::matte::{Rank, Tally, ranked};
 use super::near::{Batches, Near};
 use crate::film::Samples;
+use crate::lanes::{Float8, LANES, Vec3x8};
 use crate::scene::Aov;
 use crate::shapes::RowRef;
 
@@ -15,15 +16,58 @@ pub(in crate::render) struct Sums {
     pixels: usize,
     /// Samples of each pixel.
     spp: u32,
-    /// Sums of what passes the pixel filter: samples are drawn from it, so all weigh the same.
-    pub normal: Vec<[f64; 3]>,
-    pub albedo: Vec<[f64; 3]>,
+    /// Sums of what passes the pixel filter, by axis: samples are drawn from it, so all weigh the same.
+    pub normal: Filtered,
+    pub albedo: Filtered,
     /// Sums of shares: box tests, primitive tests, live lanes, lanes.
     pub cost: Vec<[f64; 4]>,
     pub near: Vec<Near>,
     batches: Vec<Batches>,
     batch: u32,
     tallies: [Option<Tally>; Aov::CRYPTOMATTES.len()],
+}
+
+/// Sums of three values of each pixel, by value; empty where no layer needs them.
+#[derive(Debug)]
+pub(in crate::render) struct Filtered([Vec<f64>; 3]);
+
+impl Filtered {
+    fn new(pixels: usize) -> Self {
+        Filtered([(); 3].map(|()| vec![0.0; pixels]))
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.0[0].is_empty()
+    }
+
+    /// Adds the values of eight samples to their pixels, in the order of the lanes; misses have 0.
+    #[inline]
+    pub fn add8(&mut self, values: &Vec3x8, pixels: &[u32; LANES]) {
+        let axes = [values.x, values.y, values.z].map(Float8::to_array);
+        let one = pixels.iter().all(|pixel| *pixel == pixels[0]);
+        for (sums, values) in self.0.iter_mut().zip(axes) {
+            if one {
+                let sum = &mut sums[pixels[0] as usize];
+                *sum = values.iter().fold(*sum, |sum, value| sum + f64::from(*value));
+            } else {
+                for (pixel, value) in pixels.iter().zip(values) {
+                    sums[*pixel as usize] += f64::from(value);
+                }
+            }
+        }
+    }
+
+    /// Adds one sample to a pixel.
+    pub fn add(&mut self, pixel: usize, value: DVec3) {
+        if !self.is_empty() {
+            self.0.iter_mut().zip(value.to_array()).for_each(|(sums, value)| sums[pixel] += value);
+        }
+    }
+
+    fn means(&self, spp: u32) -> impl Iterator<Item = Samples> {
+        let share = 1.0 / f64::from(spp);
+        self.0.iter().map(move |sums| Samples::Half(sums.iter().map(|sum| (sum * share) as f32).collect()))
+    }
 }
 
 /// The layers of a block, ready to be put where they belong.
@@ -42,8 +86,8 @@ impl Sums {
         Sums {
             pixels,
             spp,
-            normal: vec![[0.0; 3]; room(&[Aov::Normal])],
-            albedo: vec![[0.0; 3]; room(&[Aov::Albedo])],
+            normal: Filtered::new(room(&[Aov::Normal])),
+            albedo: Filtered::new(room(&[Aov::Albedo])),
             cost: vec![[0.0; 4]; room(&[Aov::Cost])],
             near: vec![Near::NONE; room(&[Aov::Depth, Aov::Position, Aov::Uv, Aov::Motion, Aov::Ids])],
             batches: vec![Batches::default(); room(&[Aov::Variance])],
@@ -90,8 +134,8 @@ impl Sums {
             match aov {
                 Aov::Depth => work.floats(self.near.iter().map(|near| near.depth)),
                 Aov::Position => (0..3).for_each(|k| work.floats(places.iter().map(|place| place.0[k] as f32))),
-                Aov::Normal => (0..3).for_each(|k| work.halves(self.mean(&self.normal, k))),
-                Aov::Albedo => (0..3).for_each(|k| work.halves(self.mean(&self.albedo, k))),
+                Aov::Normal => self.normal.means(self.spp).for_each(|mean| work.channels.push(mean)),
+                Aov::Albedo => self.albedo.means(self.spp).for_each(|mean| work.channels.push(mean)),
                 Aov::Uv => (0..2).for_each(|k| work.floats(places.iter().map(|place| place.1[k] as f32))),
                 Aov::Motion => {
                     let moves = self.near.iter().zip(&places).map(|(near, place)| match near.row {
@@ -115,11 +159,6 @@ impl Sums {
             }
         }
         work
-    }
-
-    fn mean<'a>(&self, sums: &'a [[f64; 3]], k: usize) -> impl Iterator<Item = f32> + use<'a> {
-        let share = 1.0 / f64::from(self.spp);
-        sums.iter().map(move |sum| (sum[k] * share) as f32)
     }
 
     fn add_ids(&self, plan: &LayerPlan, work: &mut LayerWork) {
@@ -152,10 +191,6 @@ impl Sums {
 impl LayerWork {
     fn floats(&mut self, samples: impl Iterator<Item = f32>) {
         self.channels.push(Samples::Float(samples.collect()));
-    }
-
-    fn halves(&mut self, samples: impl Iterator<Item = f32>) {
-        self.channels.push(Samples::Half(samples.collect()));
     }
 }
 

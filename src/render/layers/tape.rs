@@ -8,7 +8,7 @@ use super::sums::{LayerWork, Sums};
 use crate::accel::PACKETS;
 use crate::film::Window;
 use crate::integrate::{RayKind, Record, Samples8, Seen, Silent, Summed, Taken};
-use crate::lanes::{Float8, LANES, Ray, Vec3x8};
+use crate::lanes::{Float8, LANES, Mask8, Ray, Vec3x8};
 use crate::plan::Owner;
 use crate::render::Frame;
 use crate::scene::Aov;
@@ -37,6 +37,25 @@ struct Met {
     materials: [[u32; LANES]; PACKETS],
 }
 
+impl Met {
+    /// What a lane saw.
+    #[inline(always)]
+    fn near(&self, p: usize, i: usize, distance: f64, sample: u32) -> Near {
+        if self.hit[p] >> i & 1 == 0 {
+            return Near { distance, sample, ..Near::NONE };
+        }
+        Near {
+            distance,
+            t: self.t[p].as_array()[i],
+            depth: self.depth[p].as_array()[i],
+            row: RowRef::from_lane(self.rows[p].as_array()[i]),
+            primitive: self.owners[p][i].primitive,
+            material: self.materials[p][i],
+            sample,
+        }
+    }
+}
+
 impl<'a, 's> LayerTape<'a, 's> {
     pub fn new(frame: &'a Frame<'s>, plan: &'a LayerPlan<'s>, pixels: usize) -> Self {
         let zero = [Vec3x8::ZERO; PACKETS];
@@ -60,35 +79,22 @@ impl<'a, 's> LayerTape<'a, 's> {
         sums.finish(plan, |pixel, near| place(frame, block.pixel(pixel), near))
     }
 
-    /// Adds to what passes the pixel filter, sample by sample in their order.
-    fn add_filtered(sums: &mut [[f64; 3]], values: &Vec3x8, hit: u32, pixels: &[u32; LANES]) {
-        let values = values.to_arrays();
-        for i in (0..LANES).filter(|i| hit >> i & 1 == 1) {
-            let sum = &mut sums[pixels[i] as usize];
-            *sum = std::array::from_fn(|k| sum[k] + f64::from(values[i][k]));
-        }
-    }
-
+    /// Of the samples of a packet the nearest to the centre of each pixel, the first of equals.
     fn add_near(&mut self, p: usize, count: usize, taken: &Taken) {
-        let (tile, hit) = (&self.tile, self.tile.hit[p]);
-        let (t, depth, rows) = (tile.t[p].to_array(), tile.depth[p].to_array(), tile.rows[p].to_array());
-        for i in 0..count {
-            let near = &mut self.sums.near[taken.pixels[p][i] as usize];
-            let distance = taken.distances[p][i];
-            if distance < near.distance {
-                let sample = taken.samples[p].index[i];
-                *near = match hit >> i & 1 == 1 {
-                    false => Near { distance, sample, ..Near::NONE },
-                    true => Near {
-                        distance,
-                        t: t[i],
-                        depth: depth[i],
-                        row: RowRef::from_lane(rows[i]),
-                        primitive: tile.owners[p][i].primitive,
-                        material: tile.materials[p][i],
-                        sample,
-                    },
-                };
+        let (pixels, distances) = (&taken.pixels[p], &taken.distances[p]);
+        let mut i = 0;
+        while i < count {
+            let pixel = pixels[i];
+            let near = &mut self.sums.near[pixel as usize];
+            let (mut best, mut distance) = (LANES, near.distance);
+            while i < count && pixels[i] == pixel {
+                if distances[i] < distance {
+                    (best, distance) = (i, distances[i]);
+                }
+                i += 1;
+            }
+            if best < LANES {
+                *near = self.tile.near(p, best, distance, taken.samples[p].index[best]);
             }
         }
     }
@@ -136,8 +142,9 @@ impl Record for LayerTape<'_, '_> {
         let (p, tile) = (seen.packet, &mut self.tile);
         let dir = seen.rays.dir;
         tile.hit[p] = seen.hit;
-        tile.normal[p] = seen.normal;
-        tile.albedo[p] = seen.bsdf.reflectance();
+        let hit = Mask8::from_bits(seen.hit);
+        tile.normal[p] = Vec3x8::select(hit, seen.normal, Vec3x8::ZERO);
+        tile.albedo[p] = Vec3x8::select(hit, seen.bsdf.reflectance(), Vec3x8::ZERO);
         (tile.t[p], tile.rows[p]) = (seen.rays.t_max, seen.rows);
         tile.depth[p] = seen.rays.t_max
             * match self.axis {
@@ -150,12 +157,11 @@ impl Record for LayerTape<'_, '_> {
     fn taken(&mut self, taken: &Taken) {
         for p in 0..taken.count.div_ceil(LANES) {
             let (count, pixels) = (LANES.min(taken.count - p * LANES), &taken.pixels[p]);
-            let hit = self.tile.hit[p];
-            if !self.sums.normal.is_empty() {
-                Self::add_filtered(&mut self.sums.normal, &self.tile.normal[p], hit, pixels);
+            if self.tile.hit[p] != 0 && !self.sums.normal.is_empty() {
+                self.sums.normal.add8(&self.tile.normal[p], pixels);
             }
-            if !self.sums.albedo.is_empty() {
-                Self::add_filtered(&mut self.sums.albedo, &self.tile.albedo[p], hit, pixels);
+            if self.tile.hit[p] != 0 && !self.sums.albedo.is_empty() {
+                self.sums.albedo.add8(&self.tile.albedo[p], pixels);
             }
             if !self.sums.near.is_empty() {
                 self.add_near(p, count, taken);
