@@ -131,10 +131,26 @@ impl<'s> Tracer<'s> {
 
     /// What the rays of some tiles of a batch meet first, from tile `first` on, and the tests that took.
     pub fn find_closest(&self, batch: &RayBatch, first: usize, found: &mut [Found]) -> Counts {
-        let mut walk = Walk::default();
         let mut tiles = vec![Tile::empty(); found.len()];
         batch.unpack(first, &mut tiles);
-        self.tree.closest_tiles(&mut tiles, &mut walk);
+        self.find(&mut tiles, found)
+    }
+
+    /// The same for rays that are made where they are traced: `packet(k, p)` is packet `p` of tile `k`.
+    pub fn find_made(
+        &self,
+        common: Option<[f32; 3]>,
+        packet: impl Fn(usize, usize) -> RayPacket,
+        found: &mut [Found],
+    ) -> Counts {
+        let packets = |k: usize| std::array::from_fn(|p| packet(k, p));
+        let mut tiles: Vec<Tile> = (0..found.len()).map(|k| Tile::new(packets(k), common)).collect();
+        self.find(&mut tiles, found)
+    }
+
+    fn find(&self, tiles: &mut [Tile], found: &mut [Found]) -> Counts {
+        let mut walk = Walk::default();
+        self.tree.closest_tiles(tiles, &mut walk);
         for (tile, found) in tiles.iter().zip(found) {
             for (p, found) in found.packets.iter_mut().enumerate() {
                 let rays = &tile.packets[p];
@@ -207,6 +223,16 @@ pub const TILE: usize = PACKETS * LANES;
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Found {
     packets: [Found8; PACKETS],
+}
+
+impl Found {
+    /// How many of the rays met something.
+    pub fn hits(&self) -> usize {
+        let met = |found: &Found8| {
+            found.rows.to_array().iter().filter(|row| RowRef::from_lane(**row).kind().is_some()).count()
+        };
+        self.packets.iter().map(met).sum()
+    }
 }
 
 /// What eight rays met: place, row, unit normal (outward) and whose it is.

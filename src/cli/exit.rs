@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use octray::measure::CompareError;
+use octray::measure::bench::BenchError;
 use octray::output::{OutputError, ReadError};
 use octray::render::RenderError;
 
@@ -67,6 +68,16 @@ impl From<ReadError> for Failure {
 impl From<CompareError> for Failure {
     fn from(error: CompareError) -> Self {
         Failure::new(Exit::Input, error)
+    }
+}
+
+impl From<BenchError> for Failure {
+    fn from(error: BenchError) -> Self {
+        match error {
+            BenchError::Render(error) => error.into(),
+            BenchError::NothingMet | BenchError::NoLight => Failure::new(Exit::Input, error),
+            BenchError::Wrong { .. } => Failure::new(Exit::No, error),
+        }
     }
 }
 

@@ -9,6 +9,7 @@
 //! | `render`, `batch`, `info`, `check`, `compare`, `query`, `convert`, `merge`, `manual` | one command each (`manual`: two) |
 //! | `args`, `atoms`, `settings` | words that several commands understand |
 //! | `jobs` | running what `render` and `batch` put on a list |
+//! | `bench`, `gate`, `pareto` | measuring |
 //! | `scene_file`, `pictures`, `hits` | files in and out |
 //! | `console`, `progress`, `stats_json` | what is said, to people and machines |
 //! | `cpu`, `system`, `signals`, `exit` | the world around the process |
@@ -16,6 +17,7 @@
 mod args;
 mod atoms;
 mod batch;
+mod bench;
 mod check;
 mod compare;
 mod console;
@@ -23,12 +25,14 @@ mod convert;
 pub mod cpu;
 mod exit;
 mod extras;
+mod gate;
 mod hits;
 mod info;
 mod jobs;
 mod layers;
 mod manual;
 mod merge;
+mod pareto;
 mod pictures;
 mod preview;
 mod progress;
@@ -63,7 +67,7 @@ Examples:
 
 `octray COMMAND --help` has the options of a command and examples of their use.
 
-Exit codes: 0 done; 1 the answer is no (check, compare); 2 wrong usage; 3 a bad input file;
+Exit codes: 0 done; 1 the answer is no (check, compare, bench gate); 2 wrong usage; 3 a bad input file;
 4 an output cannot be written; 5 out of memory or over a limit; 6 the CPU lacks what this
 build needs; 130 and 143 stopped by a signal.";
 
@@ -95,6 +99,10 @@ enum Command {
     Compare(compare::Args),
     /// Trace the rays of a file and write what they meet
     Query(query::Args),
+    /// Measure throughput by the kind of ray, or guard it: `bench gate`
+    Bench(bench::Args),
+    /// Measure run time against error: a page, plots and a table
+    Pareto(pareto::Args),
     /// Convert scenes to TOML, and pictures between EXR and PNG
     Convert(convert::Args),
     /// Join crops of one frame to the frame
@@ -213,6 +221,8 @@ pub fn run() -> ExitCode {
         Command::Check(args) => check::run(args, &run),
         Command::Compare(args) => compare::run(args, &run),
         Command::Query(args) => query::run(args, &run),
+        Command::Bench(args) => bench::run(args, &run),
+        Command::Pareto(args) => pareto::run(args, &run),
         Command::Convert(args) => convert::run(args, &run),
         Command::Merge(args) => merge::run(args, &run),
         Command::Completions(args) => manual::completions(args, &run),

@@ -22,6 +22,29 @@ pub fn cpu_seconds() -> Option<f64> {
     None
 }
 
+/// CPU seconds that all processes spent that this one started and waited for, and theirs.
+#[cfg(unix)]
+pub fn children_seconds() -> Option<f64> {
+    use nix::sys::resource::{UsageWho, getrusage};
+    let spent = getrusage(UsageWho::RUSAGE_CHILDREN).ok()?;
+    let seconds = |time: nix::sys::time::TimeVal| time.tv_sec() as f64 + time.tv_usec() as f64 * 1e-6;
+    Some(seconds(spent.user_time()) + seconds(spent.system_time()))
+}
+
+/// CPU seconds of processes that this one started: not known here.
+#[cfg(not(unix))]
+pub fn children_seconds() -> Option<f64> {
+    None
+}
+
+/// What the CPU calls itself, where the system says so.
+pub fn cpu_model() -> String {
+    let text = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let line = text.lines().find(|line| line.starts_with("model name"));
+    let name = line.and_then(|line| line.split_once(':')).map(|(_, name)| name.trim().to_owned());
+    name.unwrap_or_else(|| std::env::consts::ARCH.to_owned())
+}
+
 /// Makes sure that work will not run out of memory, where the system tells how much there is: it would
 /// kill the process without a word later on.
 pub fn need_memory(bytes: u64, work: &str) -> Result<(), Failure> {

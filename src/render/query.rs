@@ -67,6 +67,11 @@ impl<'s> Query<'s> {
         self.pool.current_num_threads()
     }
 
+    /// Does something on its threads.
+    pub fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
+        self.pool.install(work)
+    }
+
     /// The tracer behind it, unless that is the reference.
     pub fn tracer(&self) -> Option<&Tracer<'s>> {
         match &self.asked {
@@ -154,6 +159,21 @@ impl Batch {
     pub fn new(rays: Vec<Ray>) -> Self {
         let columns = RayBatch::new(&rays);
         Batch { rays, columns }
+    }
+
+    /// The rays.
+    pub fn rays(&self) -> &[Ray] {
+        &self.rays
+    }
+
+    /// How many rays.
+    pub fn len(&self) -> usize {
+        self.rays.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.rays.is_empty()
     }
 
     /// Tiles of 64 rays.
