@@ -7,7 +7,7 @@ use crate::lanes::{Float8, LANES, Ray, RayPacket, UNIT_ROUNDOFF, Vec3x8};
 use crate::plan::{InvalidScene, Plan, validate};
 use crate::scene::Scene;
 use crate::shade::attributes;
-use crate::shapes::RowRef;
+use crate::shapes::{Ray64, RowRef};
 
 /// The columns and the tree of one scene.
 ///
@@ -33,7 +33,7 @@ pub struct Tracer<'s> {
 /// Where a ray met something.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
-    /// Place on the ray, in lengths of its direction.
+    /// Place on the ray, in lengths of its direction; within one ulp.
     pub t: f32,
     /// Index of the primitive: objects in file order, then the rows of the clouds.
     pub primitive: u32,
@@ -92,6 +92,11 @@ impl<'s> Tracer<'s> {
     /// With `true`, rays go one by one: the same bits, more slowly.
     pub fn one_by_one(self, one_by_one: bool) -> Self {
         Tracer { tree: self.tree.one_by_one(one_by_one), ..self }
+    }
+
+    /// With `false`, f32 alone decides what rays meet, wrongly at times: for measuring what certainty costs.
+    pub fn certify(self, certify: bool) -> Self {
+        Tracer { tree: self.tree.certify(certify), ..self }
     }
 
     /// The plan behind it.
@@ -196,6 +201,13 @@ impl<'s> Tracer<'s> {
         packets.flat_map(|(rays, found)| self.eight_hits(rays, found)).collect()
     }
 
+    /// The place of a hit again, in f64: what is left is its rounding.
+    fn place(&self, row: RowRef, ray: &Ray64, t: f32) -> f32 {
+        let stores = self.tree.stores();
+        let again = || stores.refine(row, ray, f64::from(t)).map(|surface| surface.t);
+        stores.decide(row, ray).or_else(again).map_or(t, |t| t as f32)
+    }
+
     fn eight_hits(&self, rays: &RayPacket, found: &Found8) -> [Option<Hit>; LANES] {
         let Found8 { t, rows, normal, primitives } = *found;
         let stores = self.tree.stores();
@@ -211,7 +223,8 @@ impl<'s> Tracer<'s> {
             let uv = attributes::uv(&self.plan, stores, row, owner, DVec3::from_array(point.map(f64::from)));
             let error = errors[i] + 2.0 * UNIT_ROUNDOFF * point.iter().map(|x| x.abs()).sum::<f32>();
             let uv = uv.as_vec2().to_array();
-            Some(Hit { t: t[i], primitive: primitives[i], material, normal, uv, front, point, error })
+            let t = self.place(row, &Ray64::exact(&rays.lane(i)), t[i]);
+            Some(Hit { t, primitive: primitives[i], material, normal, uv, front, point, error })
         })
     }
 }

@@ -1,5 +1,6 @@
 //! One ray with all that its way down the tree takes.
 
+use super::leaf::Best;
 use super::node::{LEAST_DIRECTION, OUTWARD, reach};
 use crate::lanes::{Float8, LANES, Mask8, RayPacket, Vec3x8, float8};
 use crate::shapes::RowRef;
@@ -10,7 +11,7 @@ use crate::shapes::RowRef;
 pub struct Line {
     /// Origin, open end, inverse direction, and how far boxes are looked for.
     way: Float8,
-    /// Direction, `1 / (dir . dir)`, closed end and what was met there.
+    /// Direction, `1 / (dir . dir)`, closed end, and of what was met row, place and the least that may be: see [`Best`].
     ray: Float8,
 }
 
@@ -22,15 +23,17 @@ const DIR: usize = 0;
 const INV_DD: usize = 3;
 const T_MAX: usize = 4;
 const HIT: usize = 5;
+const PLACE: usize = 6;
+const LOW: usize = 7;
 
 impl Line {
-    /// The rays of a packet, and the octant of each.
+    /// The rays of a packet, and the octant of each; `best`: rows, places and lows of what they have met.
     #[inline(always)]
-    pub fn of_packet(rays: &RayPacket, hits: Float8) -> ([Line; LANES], [u8; LANES]) {
+    pub fn of_packet(rays: &RayPacket, [hits, places, lows]: [Float8; 3]) -> ([Line; LANES], [u8; LANES]) {
         let (origin, dir) = ([rays.origin.x, rays.origin.y, rays.origin.z], [rays.dir.x, rays.dir.y, rays.dir.z]);
         let [x, y, z] = dir.map(inverse);
         let way = [origin[0], origin[1], origin[2], rays.t_min, x, y, z, reach(rays.t_max)];
-        let ray = [dir[0], dir[1], dir[2], rays.inv_dd, rays.t_max, hits, Float8::ZERO, Float8::ZERO];
+        let ray = [dir[0], dir[1], dir[2], rays.inv_dd, rays.t_max, hits, places, lows];
         let (way, ray) = (Float8::transpose(way), Float8::transpose(ray));
         let [x, y, z] = dir.map(|d| Mask8::sign(d).bits());
         let octant = |lane| (x >> lane & 1 | (y >> lane & 1) << 1 | (z >> lane & 1) << 2) as u8;
@@ -73,31 +76,27 @@ impl Line {
         self.way.as_array()[REACH]
     }
 
-    /// Closed end: the place of the best hit.
+    /// The best hit.
     #[inline(always)]
-    pub fn t_max(&self) -> f32 {
-        self.ray.as_array()[T_MAX]
-    }
-
-    /// What was met there.
-    #[inline(always)]
-    pub fn hit(&self) -> RowRef {
-        RowRef::from_lane(self.ray.as_array()[HIT])
+    pub fn best(&self) -> Best {
+        let ray = self.ray.as_array();
+        Best { row: RowRef::from_lane(ray[HIT]), t: ray[PLACE], low: ray[LOW], high: ray[T_MAX] }
     }
 
     /// Sets the best hit.
     #[inline(always)]
-    pub fn set(&mut self, t_max: f32, hit: RowRef) {
+    pub fn set(&mut self, best: &Best) {
         let ray = self.ray.as_mut_array();
-        (ray[T_MAX], ray[HIT]) = (t_max, hit.to_lane());
-        self.way.as_mut_array()[REACH] = reach(float8(t_max)).as_array()[0];
+        (ray[T_MAX], ray[HIT], ray[PLACE], ray[LOW]) = (best.high, best.row.to_lane(), best.t, best.low);
+        self.way.as_mut_array()[REACH] = reach(float8(best.high)).as_array()[0];
     }
 
     /// Ends the ray, which met something.
     #[inline(always)]
-    pub fn end(&mut self, hit: RowRef) {
+    pub fn end(&mut self, row: RowRef) {
         self.way.as_mut_array()[T_MIN] = f32::INFINITY;
-        self.set(f32::NEG_INFINITY, hit);
+        let end = f32::NEG_INFINITY;
+        self.set(&Best { row, t: end, low: end, high: end });
     }
 }
 

@@ -60,6 +60,8 @@ pub struct Counts {
     pub kinds: [u64; Kind::ALL.len()],
     /// Pairs decided again in f64.
     pub redecided: u64,
+    /// Pairs of hits among them whose order f64 cannot tell either.
+    pub ties: u64,
 }
 
 impl Counts {
@@ -82,6 +84,7 @@ impl Counts {
     pub fn add(&mut self, other: &Counts) {
         self.boxes += other.boxes;
         self.redecided += other.redecided;
+        self.ties += other.ties;
         for (sum, count) in self.kinds.iter_mut().zip(other.kinds) {
             *sum += count;
         }
@@ -92,6 +95,12 @@ impl Tree {
     /// With `true`, tiles are taken apart and their rays go one by one: the same bits, more slowly.
     pub fn one_by_one(self, one_by_one: bool) -> Self {
         Tree { one_by_one, ..self }
+    }
+
+    /// With `false`, f32 alone decides, and some rays are decided wrongly: for measuring what certainty costs.
+    pub fn certify(mut self, certify: bool) -> Self {
+        self.stores.set_certify(certify);
+        self
     }
 
     /// The stores, for what is to be known of a row that was met.

@@ -10,9 +10,10 @@ use super::leaf::LineLeaf;
 use super::line::Line;
 use super::node::{Child, Content, Node, near_planes};
 use super::stack::{Entry, Stack};
+use super::tile::Tile;
 use super::{Counts, Tree};
-use crate::lanes::{Float8, LANES, Mask8, RayPacket, bits, float8};
-use crate::shapes::RowRef;
+use crate::lanes::{ExactPacket, Float8, LANES, Mask8, Ray, bits, float8};
+use crate::shapes::{Ray64, RowRef};
 
 /// Rays that are to go down on their own, and room for it.
 #[derive(Debug, Default)]
@@ -20,9 +21,41 @@ pub struct Stream {
     /// Eight a packet.
     lines: Vec<Line>,
     octants: Vec<u8>,
+    exact: Exact,
     /// By octant: rays that wait.
     waiting: [Vec<u16>; 8],
     room: Room,
+}
+
+/// Rays before they were rounded, where those decide what f32 leaves open.
+#[derive(Debug, Default)]
+pub struct Exact {
+    packets: Vec<ExactPacket>,
+    /// By packet of the stream, its place among those; [`u32::MAX`] for rays that are what their bits are.
+    places: Vec<u32>,
+}
+
+impl Exact {
+    fn clear(&mut self) {
+        self.packets.clear();
+        self.places.clear();
+    }
+
+    #[inline(always)]
+    fn add(&mut self, packet: Option<&ExactPacket>) {
+        self.places.push(packet.map_or(u32::MAX, |_| self.packets.len() as u32));
+        self.packets.extend(packet);
+    }
+
+    /// The ray that decides for the ray of a stream with these bits.
+    pub fn ray(&self, number: u16, bits: &Ray) -> Ray64 {
+        let (packet, lane) = (usize::from(number) / LANES, usize::from(number) % LANES);
+        let ray = Ray64::exact(bits);
+        match self.packets.get(self.places[packet] as usize) {
+            Some(packet) => ray.from(packet, lane),
+            None => ray,
+        }
+    }
 }
 
 /// Lists of the nodes on the way, one behind the other, and what waits.
@@ -51,6 +84,7 @@ impl Stream {
     pub fn clear(&mut self) {
         self.lines.clear();
         self.octants.clear();
+        self.exact.clear();
     }
 
     /// How many packets there are.
@@ -58,12 +92,13 @@ impl Stream {
         self.lines.len() / LANES
     }
 
-    /// Takes a packet, and tells its number.
+    /// Takes a packet of a tile, and tells its number.
     #[inline(always)]
-    pub fn add(&mut self, rays: &RayPacket, hits: Float8) -> usize {
-        let (lines, octants) = Line::of_packet(rays, hits);
+    pub fn add(&mut self, tile: &Tile, p: usize) -> usize {
+        let (lines, octants) = Line::of_packet(&tile.packets[p], [tile.hits[p], tile.places[p], tile.lows[p]]);
         self.lines.extend(lines);
         self.octants.extend(octants);
+        self.exact.add(tile.exact.as_ref().map(|exact| &exact[p]));
         self.packets() - 1
     }
 
@@ -76,25 +111,22 @@ impl Stream {
         }
     }
 
-    /// Takes over what some rays of a packet have met since.
+    /// Takes over what some rays of a packet of a tile have met since.
     #[inline(always)]
-    pub fn refresh(&mut self, packet: usize, lanes: u32, rays: &RayPacket, hits: &Float8) {
+    pub fn refresh(&mut self, packet: usize, lanes: u32, tile: &Tile, p: usize) {
         let lines = &mut self.lines[packet * LANES..][..LANES];
-        let (t_max, hits) = (rays.t_max.as_array(), hits.as_array());
-        bits(lanes).for_each(|lane| lines[lane].set(t_max[lane], RowRef::from_lane(hits[lane])));
+        bits(lanes).for_each(|lane| lines[lane].set(&tile.best(p, lane)));
     }
 
     /// Hands back what some rays of a packet have met; with `ANY` those that met something are dead.
     #[inline(always)]
-    pub fn hand_back<const ANY: bool>(&self, packet: usize, lanes: u32, rays: &mut RayPacket, hits: &mut Float8) {
+    pub fn hand_back<const ANY: bool>(&self, packet: usize, lanes: u32, tile: &mut Tile, p: usize) {
         let lines = &self.lines[packet * LANES..][..LANES];
-        let (t_min, t_max) = (rays.t_min.as_mut_array(), rays.t_max.as_mut_array());
-        let hits = hits.as_mut_array();
         for lane in bits(lanes) {
-            t_max[lane] = lines[lane].t_max();
-            hits[lane] = lines[lane].hit().to_lane();
-            if ANY && lines[lane].hit() != RowRef::MISS {
-                t_min[lane] = f32::INFINITY;
+            let best = lines[lane].best();
+            tile.set_best(p, lane, &best);
+            if ANY && best.row != RowRef::MISS {
+                tile.packets[p].t_min.as_mut_array()[lane] = f32::INFINITY;
             }
         }
     }
@@ -108,17 +140,17 @@ impl Tree {
         stream: &mut Stream,
         counts: &mut Counts,
     ) {
-        let Stream { lines, waiting, room, .. } = stream;
+        let Stream { lines, waiting, room, exact, .. } = stream;
         for (octant, list) in waiting.iter_mut().enumerate().filter(|(_, list)| !list.is_empty()) {
             room.fit(self.room, list.len());
             if self.one_by_one {
                 for ray in list.iter() {
                     room.rays[0] = *ray;
-                    self.descend_octant::<ANY, CULL>(from, octant, 1, lines, room, counts);
+                    self.descend_octant::<ANY, CULL>(from, (octant, 1), (lines, exact), room, counts);
                 }
             } else {
                 room.rays[..list.len()].copy_from_slice(list);
-                self.descend_octant::<ANY, CULL>(from, octant, list.len(), lines, room, counts);
+                self.descend_octant::<ANY, CULL>(from, (octant, list.len()), (lines, exact), room, counts);
             }
             list.clear();
         }
@@ -128,9 +160,8 @@ impl Tree {
     fn descend_octant<const ANY: bool, const CULL: bool>(
         &self,
         from: Child,
-        octant: usize,
-        count: usize,
-        lines: &mut [Line],
+        (octant, count): (usize, usize),
+        (lines, exact): (&mut [Line], &Exact),
         room: &mut Room,
         counts: &mut Counts,
     ) {
@@ -143,7 +174,7 @@ impl Tree {
             let nearest = match child.content() {
                 Content::Leaf(leaf) => {
                     let (stores, rays) = (&self.stores, &rays[range]);
-                    stores.visit(leaf.kind, LineLeaf::<ANY, CULL> { stores, leaf, rays, lines, counts });
+                    stores.visit(leaf.kind, LineLeaf::<ANY, CULL> { stores, leaf, rays, lines, exact, counts });
                     None
                 }
                 Content::Node(index) => {

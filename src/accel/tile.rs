@@ -1,12 +1,12 @@
 //! 64 rays down the tree: a lane is a packet, in leaves a ray.
 
 use super::bundle::Bundle;
-use super::leaf::PacketLeaf;
+use super::leaf::{Best, PacketLeaf};
 use super::node::{Beam, Child, Content, Leaf, Node, reach};
 use super::stack::{Entry, Stack};
 use super::stream::Stream;
 use super::{Counts, Tree, Walk};
-use crate::lanes::{Columns, Float8, LANES, Mask8, Ray, RayPacket, Vec3x8, bits, float8, greatest};
+use crate::lanes::{Columns, ExactPacket, Float8, LANES, Mask8, Ray, RayPacket, Vec3x8, bits, float8, greatest};
 use crate::shapes::RowRef;
 
 /// Packets of a tile.
@@ -21,6 +21,14 @@ pub struct Tile {
     pub hits: [Float8; PACKETS],
     /// The origin, where all rays share it to the bit.
     pub common: Option<[f32; 3]>,
+    /// The rays before they were rounded, where what f32 leaves open is to be decided by these and not by the numbers
+    /// that their bits are.
+    pub exact: Option<Box<[ExactPacket; PACKETS]>>,
+    /// Room for these.
+    spare: Option<Box<[ExactPacket; PACKETS]>>,
+    /// Where the hits are, and the least that their exact places may be; on the way `t_max` is the most.
+    pub(super) places: [Float8; PACKETS],
+    pub(super) lows: [Float8; PACKETS],
 }
 
 /// A packet that is so much wider than a box goes on as rays.
@@ -64,7 +72,9 @@ struct Own<'a> {
 impl Tile {
     /// Rays that have met nothing yet.
     pub fn new(packets: [RayPacket; PACKETS], common: Option<[f32; 3]>) -> Self {
-        Tile { packets, hits: [float8(RowRef::MISS.to_lane()); PACKETS], common }
+        let none = [Float8::ZERO; PACKETS];
+        let hits = [float8(RowRef::MISS.to_lane()); PACKETS];
+        Tile { packets, hits, common, exact: None, spare: None, places: none, lows: none }
     }
 
     /// Dead rays.
@@ -83,6 +93,44 @@ impl Tile {
     pub fn renew(&mut self, common: Option<[f32; 3]>) {
         self.hits = [float8(RowRef::MISS.to_lane()); PACKETS];
         self.common = common;
+        self.spare = self.exact.take().or(self.spare.take());
+    }
+
+    /// Room for the rays before they were rounded, which from now on decide.
+    pub fn exact_mut(&mut self) -> &mut [ExactPacket; PACKETS] {
+        let spare = self.spare.take();
+        self.exact.get_or_insert_with(|| spare.unwrap_or_else(|| Box::new([ExactPacket::default(); PACKETS])))
+    }
+
+    /// The best hit of a ray so far.
+    #[inline(always)]
+    pub(super) fn best(&self, packet: usize, lane: usize) -> Best {
+        Best {
+            row: self.hit(packet, lane),
+            t: self.places[packet].as_array()[lane],
+            low: self.lows[packet].as_array()[lane],
+            high: self.packets[packet].t_max.as_array()[lane],
+        }
+    }
+
+    /// Sets it.
+    #[inline(always)]
+    pub(super) fn set_best(&mut self, packet: usize, lane: usize, best: &Best) {
+        self.hits[packet].as_mut_array()[lane] = best.row.to_lane();
+        self.places[packet].as_mut_array()[lane] = best.t;
+        self.lows[packet].as_mut_array()[lane] = best.low;
+        self.packets[packet].t_max.as_mut_array()[lane] = best.high;
+    }
+
+    /// Begins a walk: the ends of the rays are the places to beat.
+    fn begin(&mut self) {
+        self.places = std::array::from_fn(|p| self.packets[p].t_max);
+        self.lows = self.places;
+    }
+
+    /// Ends it: `t_max` is the place of the hit.
+    fn finish(&mut self) {
+        (0..PACKETS).for_each(|p| self.packets[p].t_max = self.places[p]);
     }
 
     /// Lanes of a packet that met something: a miss is the only reference whose bits are a NaN, as long as there
@@ -119,10 +167,11 @@ impl Tree {
             walk.apart.clear();
             let mut parted = std::mem::take(&mut walk.parted);
             for (i, tile) in tiles.iter_mut().enumerate() {
+                tile.begin();
                 let apart = self.walk_tile::<ANY, CULL>(tile, walk);
                 parted.extend(bits(apart).map(|p| (i as u32, p as u32)));
                 for p in bits(apart) {
-                    let number = walk.apart.add(&tile.packets[p], tile.hits[p]);
+                    let number = walk.apart.add(tile, p);
                     walk.apart.wait(number, tile.packets[p].live().bits());
                 }
             }
@@ -130,9 +179,12 @@ impl Tree {
             for (number, (i, p)) in parted.drain(..).enumerate() {
                 let (tile, p) = (&mut tiles[i as usize], p as usize);
                 let live = tile.packets[p].live().bits();
-                walk.apart.hand_back::<ANY>(number, live, &mut tile.packets[p], &mut tile.hits[p]);
+                walk.apart.hand_back::<ANY>(number, live, tile, p);
             }
             walk.parted = parted;
+            if !ANY {
+                tiles.iter_mut().for_each(Tile::finish);
+            }
         }
     }
 
@@ -211,7 +263,10 @@ impl Tile {
         let stores = &tree.stores;
         let (packets, hits) = (&mut self.packets[..], &mut self.hits[..]);
         let common = self.common.map(Vec3x8::splat);
-        stores.visit(leaf.kind, PacketLeaf::<ANY, CULL> { stores, leaf, packets, hits, mask, common, counts })
+        let (places, lows) = (&mut self.places[..], &mut self.lows[..]);
+        let exact = self.exact.as_ref().map(|exact| &exact[..]);
+        let work = PacketLeaf::<ANY, CULL> { stores, leaf, packets, hits, places, lows, exact, mask, common, counts };
+        stores.visit(leaf.kind, work)
     }
 }
 
@@ -277,9 +332,9 @@ impl<const ANY: bool, const CULL: bool> Packets<'_, ANY, CULL> {
     fn alone(&mut self, child: Child, slot: Option<(&Node, usize)>, members: u32, counts: &mut Counts) {
         let (mut touched, mut waiting) = (0, [0; PACKETS]);
         for p in bits(members) {
-            let (rays, hits) = (&self.tile.packets[p], &self.tile.hits[p]);
+            let rays = &self.tile.packets[p];
             let mut lanes = rays.live().bits();
-            self.own.know(p, rays, hits);
+            self.own.know(p, self.tile);
             if let Some((node, slot)) = slot {
                 counts.boxes += LANES as u64;
                 lanes &= self.own.beams[p].0.meets_child(node, slot, reach(rays.t_max)).1.bits();
@@ -289,7 +344,7 @@ impl<const ANY: bool, const CULL: bool> Packets<'_, ANY, CULL> {
                     touched |= self.tile.meet::<ANY, CULL>(self.tree, leaf, 1 << p, counts);
                 }
                 _ if lanes != 0 => {
-                    self.own.stream.refresh(self.own.beams[p].1, lanes, rays, hits);
+                    self.own.stream.refresh(self.own.beams[p].1, lanes, self.tile, p);
                     self.own.stream.wait(self.own.beams[p].1, lanes);
                     waiting[p] = lanes;
                     touched |= 1 << p;
@@ -299,9 +354,8 @@ impl<const ANY: bool, const CULL: bool> Packets<'_, ANY, CULL> {
         }
         self.tree.descend_rays::<ANY, CULL>(child, self.own.stream, counts);
         for (p, lanes) in waiting.into_iter().enumerate() {
-            let (rays, hits) = (&mut self.tile.packets[p], &mut self.tile.hits[p]);
             if lanes != 0 {
-                self.own.stream.hand_back::<ANY>(self.own.beams[p].1, lanes, rays, hits);
+                self.own.stream.hand_back::<ANY>(self.own.beams[p].1, lanes, self.tile, p);
             }
         }
         self.look_again(touched);
@@ -326,10 +380,11 @@ impl<const ANY: bool, const CULL: bool> Packets<'_, ANY, CULL> {
 impl Own<'_> {
     /// Makes the rays of a packet known.
     #[inline(always)]
-    fn know(&mut self, p: usize, rays: &RayPacket, hits: &Float8) {
+    fn know(&mut self, p: usize, tile: &Tile) {
         if self.known >> p & 1 == 0 {
+            let rays = &tile.packets[p];
             let beam = Bundle::of_rays(rays).beam(rays.live().bits());
-            self.beams[p] = (beam, self.stream.add(rays, *hits));
+            self.beams[p] = (beam, self.stream.add(tile, p));
             self.known |= 1 << p;
         }
     }

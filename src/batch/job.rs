@@ -65,6 +65,8 @@ pub struct Settings {
     pub engine: Engine,
     /// What may be left out where it is not needed.
     pub skips: SkipSet,
+    /// Let f32 alone decide what rays meet, for measuring what certainty costs.
+    pub uncertified: bool,
     /// How samples are stored.
     pub options: output::Options,
     /// Leave out of the file what differs from run to run.
@@ -97,7 +99,7 @@ impl Job {
             View::Named(name) => Renderer::new(scene)?.camera(name)?,
             View::Given(camera) => Renderer::seen_from(scene, camera)?,
         };
-        renderer = renderer.skips(settings.skips).engine(settings.engine);
+        renderer = renderer.skips(settings.skips).certify(!settings.uncertified).engine(settings.engine);
         if let Some((width, height)) = settings.resolution {
             renderer = renderer.resolution(width, height);
         }

@@ -21,7 +21,8 @@ Examples:
     after_help = EXAMPLES,
     long_about = "Check the engine against the f64 reference on a scene\n\n\
         Ray by ray: every ray that the engine traced is traced again by the reference, as the exact numbers that \
-        its bits are, and must meet the same primitive. Picture by picture: the reference renders the scene by \
+        its bits are (camera rays from the f64 that they were rounded from), and must meet the same primitive; only \
+        what f64 cannot tell apart is a tie. Picture by picture: the reference renders the scene by \
         itself, and the colours must agree. Ends with 1 where they do not."
 )]
 pub struct Args {
@@ -39,6 +40,9 @@ pub struct Args {
     /// Seed of the choice of pixels
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
+    /// Check an engine that lets f32 alone decide: to see what certainty is good for
+    #[arg(long)]
+    no_certify: bool,
     #[command(flatten)]
     threads: Threads,
     #[command(flatten)]
@@ -55,7 +59,13 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
     scene_file::need_memory(&scene, 0, "the check of this scene")?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads.count()).build();
     let pool = pool.map_err(|error| Failure::new(Exit::Limit, format!("cannot start threads: {error}")))?;
-    let settings = CheckSettings { spp: args.spp, seconds: args.seconds, seed: args.seed, ..CheckSettings::default() };
+    let settings = CheckSettings {
+        spp: args.spp,
+        seconds: args.seconds,
+        seed: args.seed,
+        certify: !args.no_certify,
+        ..CheckSettings::default()
+    };
     let report = pool.install(|| check(&scene, &settings))?;
     if args.json {
         let json = serde_json::to_value(&report).map_err(|error| Failure::new(Exit::Limit, error))?;

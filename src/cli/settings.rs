@@ -49,6 +49,9 @@ pub struct Settings {
     #[arg(long, value_name = "NAME,...", num_args = 0..=1, require_equals = true, value_delimiter = ',',
         default_missing_value = "all", value_parser = skip_names())]
     no_skip: Vec<String>,
+    /// Let f32 alone decide what rays meet, wrongly at times: to measure what certainty costs
+    #[arg(long)]
+    no_certify: bool,
     #[command(flatten)]
     depth: Depth,
     /// Leave out of the file what differs from run to run (date, seconds, threads); so does SOURCE_DATE_EPOCH
@@ -95,6 +98,7 @@ impl Settings {
             integrator: self.integrator.map(Integrator::from),
             engine: Engine::from(self.engine),
             skips: self.skips(),
+            uncertified: self.no_certify,
             options: Default::default(),
             undated: self.no_date || std::env::var_os("SOURCE_DATE_EPOCH").is_some(),
         };

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
 
-use crate::lanes::{Float8, LANES, Mask8, RayPacket, Vec3x8, float8};
+use crate::lanes::{ExactPacket, Float8, LANES, Mask8, RayPacket, Vec3x8, float8};
 use crate::sample::{self, Pattern, Pattern8, dimension};
 use crate::scene::{Camera, Filter, FilterTable, Lens};
 
@@ -167,15 +167,6 @@ impl Samples8 {
         self.key[lane] = pattern.key;
         self.pattern.set(lane, pattern.filter);
     }
-}
-
-/// Origins and directions of eight rays in f64, by axis.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct ExactPacket {
-    /// Scene units, relative to the plan's origin.
-    pub origin: [[f64; LANES]; 3],
-    /// Any length.
-    pub dir: [[f64; LANES]; 3],
 }
 
 impl ExactPacket {

@@ -2,10 +2,9 @@
 
 use glam::DVec3;
 
-use super::camera::ExactPacket;
 use super::record::RayKind;
 use crate::accel::{PACKETS, Tile};
-use crate::lanes::{LANES, Mask8, Ray, RayPacket, Vec3x8, float8};
+use crate::lanes::{ExactPacket, LANES, Mask8, Ray, RayPacket, Vec3x8, float8};
 
 /// Rays of a wave.
 pub const WAVE: usize = PACKETS * LANES;

@@ -99,7 +99,17 @@ impl RayPacket {
         Mask8::gt(t, self.t_min) & Mask8::le(t, self.t_max)
     }
 
+    /// Lanes in which a hit at `t`, known to within `error`, may lie on the ray, and among them those of which it is
+    /// open whether it lies beyond the start.
+    #[inline(always)]
+    pub fn reaches(&self, t: Float8, error: Float8) -> (Mask8, Mask8) {
+        let (low, high) = (t - error, t + error);
+        let possible = Mask8::gt(high, self.t_min) & Mask8::le(low, self.t_max);
+        (possible, possible & Mask8::le(low, self.t_min))
+    }
+
     /// Lanes that take part.
+    #[inline(always)]
     pub fn live(&self) -> Mask8 {
         Mask8::lt(self.t_min, self.t_max)
     }
@@ -110,17 +120,21 @@ impl RayPacket {
 pub struct Hit8 {
     /// Place of the hit on its ray; means nothing in missed lanes.
     pub t: Float8,
-    /// Lanes that hit, as far as f32 can tell.
+    /// Bound on the distance of `t` from the place that exact geometry has: that of the scene in f64, and of any ray
+    /// whose coordinates round to these.
+    pub error: Float8,
+    /// Lanes that hit, as far as f32 can tell, and no further than the ray's end by more than the error.
     pub mask: Mask8,
     /// Lanes too close to call: hit or miss is to be decided in f64. Those in `mask` as well have a `t` that is
-    /// right if they hit, and keep it, so that coincident primitives have the same; the others get theirs in f64.
+    /// right if they hit, and keep it; the others get theirs in f64.
     pub doubt: Mask8,
 }
 
 impl Hit8 {
     /// No lane hits and none is in doubt.
+    #[inline(always)]
     pub fn none() -> Self {
-        Hit8 { t: Float8::ZERO, mask: Mask8::NONE, doubt: Mask8::NONE }
+        Hit8 { t: Float8::ZERO, error: Float8::ZERO, mask: Mask8::NONE, doubt: Mask8::NONE }
     }
 
     /// The `t` of one lane, if it hit for certain.
@@ -128,4 +142,13 @@ impl Hit8 {
         let bit = 1 << i;
         (self.mask.bits() & bit != 0 && self.doubt.bits() & bit == 0).then(|| self.t.to_array()[i])
     }
+}
+
+/// Origins and directions of eight rays in f64, by axis.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ExactPacket {
+    /// Scene units, relative to the plan's origin.
+    pub origin: [[f64; LANES]; 3],
+    /// Any length.
+    pub dir: [[f64; LANES]; 3],
 }

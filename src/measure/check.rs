@@ -1,8 +1,8 @@
 //! The packet engine against the reference: ray by ray, and picture by picture.
 //!
 //! Ray by ray, the rays that the engine traced are replayed in the reference as the exact numbers that
-//! their bits are; a different answer is wrong unless f32 could not have told (see
-//! [`Verdict`]). Picture by picture, the reference renders from its own
+//! their bits are, but camera rays from the f64 that they were rounded from; a different answer is wrong unless
+//! f64 could not have told (see [`Verdict`]). Picture by picture, the reference renders from its own
 //! f64 rays with the same samples; pixels whose rays, shadow rays and texture cells all agree must have
 //! the same colour up to rounding, and the others must be few. Behind mirrors and glass every bounce
 //! multiplies rounding, so there the means must agree and few pixels may differ visibly.
@@ -44,11 +44,13 @@ pub struct CheckSettings {
     pub seed: u64,
     /// Differences to list, at most.
     pub listed: usize,
+    /// Whether the engine decides in f64 what f32 leaves open, as it should; for measuring what that is good for.
+    pub certify: bool,
 }
 
 impl Default for CheckSettings {
     fn default() -> Self {
-        CheckSettings { spp: 1, seconds: 60.0, seed: 0, listed: 10 }
+        CheckSettings { spp: 1, seconds: 60.0, seed: 0, listed: 10, certify: true }
     }
 }
 
@@ -67,6 +69,8 @@ pub struct Report {
     pub picture: PictureReport,
     /// Wrong answers, the first few.
     pub differences: Vec<Difference>,
+    /// Ties, the first few.
+    pub ties: Vec<Difference>,
     /// Wall time.
     pub seconds: f64,
 }
@@ -88,7 +92,7 @@ pub struct RayReport {
     pub replayed: u64,
     /// Wrong answers.
     pub different: u64,
-    /// Other answers that f32 could not have told apart.
+    /// Other answers that f64 cannot tell apart from the right one.
     pub ties: u64,
     /// Pairs that the engine decided again in f64, of all rays of the blocks that hold the pixels.
     pub redecided: u64,
@@ -135,7 +139,7 @@ pub struct Difference {
 /// Checks a scene.
 pub fn check(scene: &Scene, settings: &CheckSettings) -> Result<Report, RenderError> {
     let start = Instant::now();
-    let renderer = Renderer::new(scene)?.spp(settings.spp).skip(false);
+    let renderer = Renderer::new(scene)?.spp(settings.spp).skip(false).certify(settings.certify);
     let frame = Frame::prepare(&renderer);
     let reference = Reference::relative_to(scene, frame.origin());
     let image = renderer.image();
@@ -209,25 +213,40 @@ impl Judge<'_, '_> {
         for note in notes {
             let Some(cast) = &note.cast else { continue };
             let ray = exact(&cast.ray);
-            let met = cast.met.map(|primitive| primitive as usize);
-            let verdict = match cast.kind {
-                RayKind::Shadow => self.reference.verdict_occluded(&ray, met.is_some()),
-                _ => self.reference.verdict(&ray, met, met.map(|_| cast.t)),
-            };
+            let verdict = self.verdict(cast, &ray, (x, y, note.event.sample));
             let report = tally.rays.of(cast.kind);
             report.replayed += 1;
             match verdict {
                 Verdict::Same => {}
-                Verdict::Tie => report.ties += 1,
+                Verdict::Tie => {
+                    report.ties += 1;
+                    if tally.ties.len() < listed {
+                        tally.ties.push(difference(cast, (x, y, note.event.sample), None, None));
+                    }
+                }
                 Verdict::Different { expected, expected_t } => {
                     report.different += 1;
                     if tally.differences.len() < listed {
-                        let (kind, at) = (cast.kind.name(), (x, y, note.event.sample));
-                        let (bits, got, t) = (bits(&cast.ray), cast.met, cast.t);
-                        tally.differences.push(Difference { kind, at, bits, got, expected, t, expected_t });
+                        let at = (x, y, note.event.sample);
+                        tally.differences.push(difference(cast, at, expected, expected_t));
                     }
                 }
             }
+        }
+    }
+
+    /// Camera rays are judged by the reference's own, which f32 rounds; all others are the numbers of their bits. Where
+    /// the primitive is right, `t` must be what f32 can do.
+    fn verdict(&self, cast: &Cast, ray: &reference::Ray, (x, y, sample): (i32, i32, u32)) -> Verdict {
+        let met = cast.met.map(|primitive| primitive as usize);
+        let exact = match cast.kind {
+            RayKind::Shadow => return self.reference.verdict_occluded_exact(ray, met.is_some()),
+            RayKind::Camera => self.reference.verdict_exact(&self.view.sample(x, y, sample), met),
+            RayKind::Reflection | RayKind::Refraction => self.reference.verdict_exact(ray, met),
+        };
+        match (exact, self.reference.verdict(ray, met, met.map(|_| cast.t))) {
+            (Verdict::Same, Verdict::Different { expected, expected_t }) => Verdict::Different { expected, expected_t },
+            _ => exact,
         }
     }
 
@@ -260,6 +279,11 @@ fn exact(ray: &Ray) -> reference::Ray {
     let wide = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
     let (t_min, t_max) = (f64::from(ray.t_min), f64::from(ray.t_max));
     reference::Ray { origin: wide(ray.origin), dir: wide(ray.dir), t_min, t_max }
+}
+
+fn difference(cast: &Cast, at: (i32, i32, u32), expected: Option<usize>, expected_t: Option<f64>) -> Difference {
+    let (kind, bits, got, t) = (cast.kind.name(), bits(&cast.ray), cast.met, cast.t);
+    Difference { kind, at, bits, got, expected, t, expected_t }
 }
 
 fn bits(ray: &Ray) -> [u32; 8] {
@@ -339,6 +363,7 @@ struct Tally {
     /// Engine, reference.
     sums: DVec3,
     differences: Vec<Difference>,
+    ties: Vec<Difference>,
 }
 
 impl RayReports {
@@ -374,6 +399,8 @@ impl Tally {
         self.sums += other.sums;
         self.differences.append(&mut other.differences);
         self.differences.truncate(listed);
+        self.ties.append(&mut other.ties);
+        self.ties.truncate(listed);
         self
     }
 
@@ -395,9 +422,9 @@ impl Tally {
             scatters,
         };
         let failures = failures(&self.rays, &picture);
-        let (rays, differences) = (self.rays, self.differences);
+        let (rays, differences, ties) = (self.rays, self.differences, self.ties);
         let (pass, seconds) = (failures.is_empty(), time.as_secs_f64());
-        Report { schema: 1, pass, failures, rays, picture, differences, seconds }
+        Report { schema: 1, pass, failures, rays, picture, differences, ties, seconds }
     }
 }
 

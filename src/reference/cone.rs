@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::exact;
 use super::line::{Line, Root, Roots, Surface, turns};
-use super::margin::{TOLERANCE, U, ratio, stored};
+use super::margin::{TOLERANCE, ratio};
 use super::quadratic::Quadratic;
 use super::span::{End, Face, Span};
 use crate::scene;
@@ -70,14 +70,14 @@ impl Cone {
             e: exact::cross(w, line.dir),
             p: (-self.slope).mul_add(f_axial, self.radius),
             q: self.slope * d_axial,
-            stored: anchors + stored(self.radius).max(stored(self.apex_radius)),
+            stored: anchors + line.stored(self.radius).max(line.stored(self.apex_radius)),
         }
     }
 
     /// The f32 error of a position at `t`.
     fn error(&self, rel: &Relative, line: &Line, t: f64) -> f64 {
         let radius = self.radius.max(self.apex_radius);
-        U * (rel.f.length() + self.length + radius + t.abs() * line.dir.length()) + rel.stored
+        line.u * (rel.f.length() + self.length + radius + t.abs() * line.dir.length()) + rel.stored
     }
 
     /// An end on the side, with the unit `error / |n.d|`; at a silhouette, where n.d vanishes, that is
@@ -90,7 +90,7 @@ impl Cone {
         let radius = (rel.p + rel.q * t).abs();
         let n_d = ratio(equation.half_width(), radius * 1f64.hypot(self.slope));
         let silhouette = ratio((2.0 * radius * error).sqrt() + error, rel.e.length());
-        End { t, unit: ratio(error, n_d).min(silhouette) + U * t.abs(), part: SIDE }
+        End { t, unit: ratio(error, n_d).min(silhouette) + line.u * t.abs(), part: SIDE }
     }
 
     pub fn roots(&self, line: &Line) -> Roots {
@@ -111,7 +111,7 @@ impl Cone {
         if !self.caps {
             return self.open(&rel, line, near, far, equation.a < 0.0);
         }
-        let mut span = Span { near, far, margin: f64::INFINITY };
+        let mut span = Span { near, far, margin: f64::INFINITY, u: line.u };
         for face in self.faces(&rel, line) {
             span.cut(face);
         }
@@ -121,7 +121,7 @@ impl Cone {
     /// The planes of both caps.
     fn faces(&self, rel: &Relative, line: &Line) -> [Face; 2] {
         let apex = exact::dot(self.axis.to_array(), (self.apex - line.origin).to_array());
-        let speed_error = U * (self.axis * line.dir).abs().element_sum();
+        let speed_error = line.u * (self.axis * line.dir).abs().element_sum();
         let face = |distance, speed, part| Face {
             distance,
             speed,
@@ -150,7 +150,7 @@ impl Cone {
 
     /// A line that stays outside: how nearly, where it is nearest between the ends of the body.
     fn near_miss(&self, rel: &Relative, line: &Line, equation: &Quadratic) -> Roots {
-        let mut span = Span::all();
+        let mut span = Span::all(line);
         for face in self.faces(rel, line) {
             span.cut(face);
         }

@@ -4,7 +4,6 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::exact;
 use super::line::{Line, Root, Roots, Surface};
-use super::margin::{U, stored};
 use super::span::{Face, Span};
 use crate::scene;
 
@@ -43,25 +42,25 @@ impl Cuboid {
         let Some(axes) = self.axes else {
             // f32 divides differences of stored numbers: nothing is lost but their own rounding.
             let faces = [self.min[i] - line.origin[i], self.max[i] - line.origin[i]];
-            let error = |corner: f64, face: f64| stored(corner) + stored(face);
+            let error = |corner: f64, face: f64| line.stored(corner) + line.stored(face);
             let face_errors = [error(self.min[i], faces[0]), error(self.max[i], faces[1])];
-            return Slab { faces, speed: line.dir[i], face_errors, speed_error: U * line.dir[i].abs() };
+            return Slab { faces, speed: line.dir[i], face_errors, speed_error: line.u * line.dir[i].abs() };
         };
         let (axis, half) = (axes.col(i), 0.5 * (self.max[i] - self.min[i]));
         let f = self.center() - line.origin;
         let middle = exact::dot(axis.to_array(), f.to_array());
         let anchor = (axis * line.anchor_error(self.center())).abs().element_sum();
-        let error = U * ((axis * f).abs().element_sum() + half) + anchor + stored(half);
+        let error = line.u * ((axis * f).abs().element_sum() + half) + anchor + line.stored(half);
         Slab {
             faces: [middle - half, middle + half],
             speed: exact::dot(axis.to_array(), line.dir.to_array()),
             face_errors: [error; 2],
-            speed_error: U * (axis * line.dir).abs().element_sum(),
+            speed_error: line.u * (axis * line.dir).abs().element_sum(),
         }
     }
 
     pub fn roots(&self, line: &Line) -> Roots {
-        let mut span = Span::all();
+        let mut span = Span::all(line);
         for i in 0..3 {
             let slab = self.slab(line, i);
             for (side, outward) in [-1.0, 1.0].into_iter().enumerate() {

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::line::{Line, Root, Roots, Surface, turns};
-use super::margin::{U, ratio, stored};
+use super::margin::ratio;
 use super::plane::Plane;
 use crate::scene;
 
@@ -31,8 +31,8 @@ impl Disk {
         }
         // The place slides along the line by the error of t; what of it is radial moves the decision.
         let slide = if distance > 0.0 { (x.dot(line.dir) / distance).abs() } else { line.dir.length() };
-        let error = root.unit * slide + line.anchor_error(self.plane.point).length() + U * distance;
-        let to = |radius: f64| error + stored(radius) + U * radius;
+        let error = root.unit * slide + line.anchor_error(self.plane.point).length() + line.u * distance;
+        let to = |radius: f64| error + line.stored(radius) + line.u * radius;
         let outer = ratio(self.radius - distance, to(self.radius));
         let inner = if self.inner > 0.0 { ratio(distance - self.inner, to(self.inner)) } else { f64::INFINITY };
         [Some(Root { hit, margin: root.margin.min(outer).min(inner), ..root }), None]

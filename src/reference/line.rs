@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::Ray;
-use super::margin::stored;
+use super::margin::U;
 
 /// A ray that can meet something: finite, with a direction.
 ///
@@ -21,6 +21,8 @@ pub struct Line {
     pub scale: f64,
     /// Whether units and margins are wanted; else bodies may leave out misses and both figures.
     pub judged: bool,
+    /// The error of one rounding of the arithmetic that is judged.
+    pub u: f64,
 }
 
 /// A place where a line meets, or nearly meets, the surface of a body.
@@ -76,7 +78,18 @@ impl Line {
             t_max: ray.t_max / scale.recip(),
             scale: scale.recip(),
             judged,
+            u: U,
         })
+    }
+
+    /// The same, judged in an arithmetic of which one rounding is `u`.
+    pub fn judged(ray: &Ray, u: f64) -> Option<Line> {
+        Line::new(ray, true).map(|line| Line { u, ..line })
+    }
+
+    /// The error of storing `x`: f32 may hold it exactly, and of f64 that is not asked.
+    pub fn stored(&self, x: f64) -> f64 {
+        if self.u == U && f64::from(x as f32) == x { 0.0 } else { self.u * x.abs() }
     }
 
     /// Whether a place lies between the ends; never where `t` is not finite.
@@ -84,10 +97,10 @@ impl Line {
         self.t_min < t && t <= self.t_max && t.is_finite()
     }
 
-    /// The f32 error of `anchor - origin`, by component: of storing the anchor, and of subtracting.
+    /// The error of `anchor - origin`, by component: of storing the anchor, and of subtracting.
     pub fn anchor_error(&self, anchor: DVec3) -> DVec3 {
         let difference = anchor - self.origin;
-        DVec3::from_array(std::array::from_fn(|i| stored(anchor[i]) + stored(difference[i])))
+        DVec3::from_array(std::array::from_fn(|i| self.stored(anchor[i]) + self.stored(difference[i])))
     }
 }
 

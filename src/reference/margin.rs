@@ -17,6 +17,9 @@ use super::{Placed, Ray, Reference};
 /// Half the spacing of f32 numbers at 1: the relative error of one rounding.
 pub const U: f64 = 1.0 / (1u64 << 24) as f64;
 
+/// The same of f64: what even exact geometry, done in f64, leaves open.
+pub const U64: f64 = 0.5 * f64::EPSILON;
+
 /// Decisions closer than this many attainable errors are ambiguous.
 pub const TOLERANCE: f64 = 8.0;
 
@@ -35,11 +38,6 @@ pub enum Verdict {
         /// Where, in lengths of the ray's direction.
         expected_t: Option<f64>,
     },
-}
-
-/// The f32 error of storing `x`.
-pub fn stored(x: f64) -> f64 {
-    if f64::from(x as f32) == x { 0.0 } else { U * x.abs() }
 }
 
 /// `a / b`, where 0 of 0 is nothing.
@@ -71,7 +69,7 @@ impl Placed {
 }
 
 /// A place on a line, by primitive.
-type Found = (usize, Root);
+pub(super) type Found = (usize, Root);
 
 impl Reference {
     /// Judges the closest hit that another tracer found: the primitive, and where it says so, `t`.
@@ -80,14 +78,24 @@ impl Reference {
     /// the tolerance times the units of both. A miss is excused where nothing is sure. A `t` must be
     /// within the tolerance of a place for which this holds, on the right primitive too.
     pub fn verdict(&self, ray: &Ray, got: Option<usize>, got_t: Option<f32>) -> Verdict {
+        self.verdict_in(U, ray, got, got_t)
+    }
+
+    /// The same without mercy for f32: a different primitive is excused only where f64 cannot tell them apart.
+    pub fn verdict_exact(&self, ray: &Ray, got: Option<usize>) -> Verdict {
+        self.verdict_in(U64, ray, got, None)
+    }
+
+    fn verdict_in(&self, u: f64, ray: &Ray, got: Option<usize>, got_t: Option<f32>) -> Verdict {
         let expected = self.closest_of(ray, Placed::sees);
         let same = expected.map(|(primitive, _)| primitive) == got;
-        let excused = match Line::new(ray, true) {
+        let excused = match Line::judged(ray, u) {
             Some(line) => self.excused(&line, got, got_t),
             None => got.is_none(),
         };
         match (same, excused) {
             (true, true) => Verdict::Same,
+            (true, false) if got_t.is_none() => Verdict::Same,
             (false, true) => Verdict::Tie,
             (_, false) => Verdict::Different {
                 expected: expected.map(|(primitive, _)| primitive),
@@ -122,11 +130,20 @@ impl Reference {
 
     /// Judges an occlusion query: `got` says whether another tracer found anything in the way.
     pub fn verdict_occluded(&self, ray: &Ray, got: bool) -> Verdict {
+        self.verdict_occluded_in(U, ray, got)
+    }
+
+    /// The same without mercy for f32.
+    pub fn verdict_occluded_exact(&self, ray: &Ray, got: bool) -> Verdict {
+        self.verdict_occluded_in(U64, ray, got)
+    }
+
+    fn verdict_occluded_in(&self, u: f64, ray: &Ray, got: bool) -> Verdict {
         if self.occluded(ray) == got {
             return Verdict::Same;
         }
         let roots = |placed: &Placed, line: &Line| placed.body.roots(line).into_iter().flatten().collect::<Vec<_>>();
-        let excused = Line::new(ray, true).is_some_and(|line| {
+        let excused = Line::judged(ray, u).is_some_and(|line| {
             let mut places = self.placed.iter().flat_map(|placed| roots(placed, &line));
             if got { places.any(|root| root.possible(&line)) } else { !places.any(|root| root.sure(&line)) }
         });
@@ -135,6 +152,19 @@ impl Reference {
         }
         let expected = self.closest_of(ray, |_, _| true);
         Verdict::Different { expected: expected.map(|(primitive, _)| primitive), expected_t: expected.map(|(_, t)| t) }
+    }
+
+    /// Of places on a ray that f64 cannot tell apart, the one of the lowest primitive.
+    pub(super) fn lowest_tie(&self, line: &Line, first: Found, near: &[Found]) -> Found {
+        let judged = Line { judged: true, u: U64, ..*line };
+        let noise = |(primitive, root): &Found| {
+            let same = |other: &Root| other.t == root.t;
+            let mut roots = self.placed[*primitive].body.roots(&judged).into_iter().flatten();
+            roots.find(same).map_or(0.0, |root| TOLERANCE * root.unit.min(1e-6 * root.t.abs()))
+        };
+        let slack = noise(&first);
+        let ties = near.iter().filter(|other| other.1.t - first.1.t <= slack + noise(other));
+        ties.copied().min_by_key(|(primitive, _)| *primitive).unwrap_or(first)
     }
 
     /// The difference of a `t` from the nearest place of one primitive on the ray, in units of that

@@ -42,11 +42,15 @@ use glam::{DVec2, DVec3};
 
 use self::body::Body;
 use self::line::{Line, Root};
+use self::margin::Found;
 use crate::scene::{Background, Light, Material, Scene, Texture, Visible};
 
 pub use self::camera::View;
 pub use self::integrator::{CameraSample, Event, EventKind, First, Pixel, RayCounts};
-pub use self::margin::{TOLERANCE, U, Verdict};
+pub use self::margin::{TOLERANCE, U, U64, Verdict};
+
+/// Places closer than this share of their `t` may be such as f64 cannot tell apart.
+const CLOSE: f64 = 1e-5;
 
 /// A scene ready to be traced.
 #[derive(Debug, Clone)]
@@ -139,7 +143,7 @@ impl Reference {
         }
     }
 
-    /// The first visible place on a ray; of places at the same `t`, the one of the lowest primitive.
+    /// The first visible place on a ray; of places that f64 cannot tell apart, the one of the lowest primitive.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         let line = Line::new(ray, false)?;
         let (primitive, root) = self.first(&line, Placed::sees)?;
@@ -170,17 +174,24 @@ impl Reference {
         self.placed.len()
     }
 
-    fn first(&self, line: &Line, sees: impl Fn(&Placed, bool) -> bool) -> Option<(usize, Root)> {
-        let mut first: Option<(usize, Root)> = None;
+    fn first(&self, line: &Line, sees: impl Fn(&Placed, bool) -> bool) -> Option<Found> {
+        let mut first: Option<Found> = None;
+        let mut near: Vec<Found> = Vec::new();
         for (primitive, placed) in self.placed.iter().enumerate() {
             for root in placed.body.roots(line).into_iter().flatten() {
-                let nearer = first.is_none_or(|(_, best)| root.t < best.t);
-                if nearer && root.counts(line) && sees(placed, root.front) {
+                let close = first.is_none_or(|(_, best)| root.t <= best.t + CLOSE * best.t.abs());
+                if !close || !root.counts(line) || !sees(placed, root.front) {
+                    continue;
+                }
+                near.push((primitive, root));
+                if first.is_none_or(|(_, best)| root.t < best.t) {
                     first = Some((primitive, root));
                 }
             }
         }
-        first
+        let best = first?;
+        near.retain(|(_, root)| root.t <= best.1.t + CLOSE * best.1.t.abs());
+        Some(if near.len() > 1 { self.lowest_tie(line, best, &near) } else { best })
     }
 
     /// The first primitive on a ray whose side is wanted, and its `t`.

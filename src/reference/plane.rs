@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::exact;
 use super::line::{Line, Root, Roots, Surface};
-use super::margin::{TOLERANCE, U, ratio};
+use super::margin::{TOLERANCE, ratio};
 use crate::scene;
 
 /// `normal . (x - point) = 0`.
@@ -31,7 +31,7 @@ impl Plane {
         let (f, low) = exact::difference(self.point, line.origin);
         let distance = exact::dot([n.x, n.y, n.z, n.x, n.y, n.z], [f.x, f.y, f.z, low.x, low.y, low.z]);
         let speed = exact::dot(n.to_array(), d.to_array());
-        let speed_error = U * (n * d).abs().element_sum();
+        let speed_error = line.u * (n * d).abs().element_sum();
         let t = distance / speed;
         let (hit, front) = (speed != 0.0 && t.is_finite(), speed < 0.0);
         if !line.judged {
@@ -43,11 +43,11 @@ impl Plane {
             return (speed_error > 0.0).then_some(unknown);
         }
         let stored = (n * line.anchor_error(self.point)).abs().element_sum() + self.warp;
-        let distance_error = U * (n * f).abs().element_sum() + stored;
+        let distance_error = line.u * (n * f).abs().element_sum() + stored;
         let unit = match facing {
             // First order says nothing about a quotient whose divisor may be 0.
             ..TOLERANCE => f64::INFINITY,
-            _ => (distance_error + t.abs() * speed_error) / speed.abs() + U * t.abs(),
+            _ => (distance_error + t.abs() * speed_error) / speed.abs() + line.u * t.abs(),
         };
         Some(Root { t, hit, front, part: 0, unit, margin: f64::INFINITY, facing })
     }

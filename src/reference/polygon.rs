@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::line::{Line, Root, Roots, Surface};
-use super::margin::{U, ratio};
+use super::margin::ratio;
 use super::plane::Plane;
 use crate::scene;
 
@@ -88,7 +88,7 @@ impl Polygon {
         let (o, length) = (line.origin, line.dir.length());
         // A quarter turn about the line changes no distance from it.
         let seen = |corner: DVec3| (corner - o).cross(line.dir) / length;
-        let error = |corner: DVec3| 2.0 * U * corner.distance(o) + line.anchor_error(corner).length();
+        let error = |corner: DVec3| 2.0 * line.u * corner.distance(o) + line.anchor_error(corner).length();
         let pass = |(a, b): (DVec3, DVec3)| ratio(segment_distance(seen(a), seen(b)), error(a).max(error(b)));
         self.edges().map(pass).fold(f64::INFINITY, f64::min)
     }

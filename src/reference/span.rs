@@ -4,7 +4,7 @@
 //! at the very number at which it enters the other's.
 
 use super::line::{Line, Root, Roots};
-use super::margin::{U, ratio};
+use super::margin::ratio;
 
 /// One end of a stretch.
 #[derive(Debug, Clone, Copy)]
@@ -23,6 +23,8 @@ pub struct Span {
     pub far: End,
     /// Margin of the decisions that have no place on the line; negative: the body is missed.
     pub margin: f64,
+    /// Of the arithmetic that is judged: the error of one rounding.
+    pub u: f64,
 }
 
 /// A flat face seen from a line: the body is on the inner side.
@@ -41,9 +43,9 @@ pub struct Face {
 
 impl Span {
     /// The whole line.
-    pub fn all() -> Span {
+    pub fn all(line: &Line) -> Span {
         let end = |t| End { t, unit: 0.0, part: 0 };
-        Span { near: end(f64::NEG_INFINITY), far: end(f64::INFINITY), margin: f64::INFINITY }
+        Span { near: end(f64::NEG_INFINITY), far: end(f64::INFINITY), margin: f64::INFINITY, u: line.u }
     }
 
     /// Leaves what is behind a face.
@@ -56,7 +58,7 @@ impl Span {
             return;
         }
         let t = distance / speed;
-        let unit = (face.distance_error + t.abs() * face.speed_error) / speed.abs() + U * t.abs();
+        let unit = (face.distance_error + t.abs() * face.speed_error) / speed.abs() + self.u * t.abs();
         let end = End { t, unit, part };
         // The first of equal ends stays, so that the lowest axis gives the normal.
         if speed < 0.0 && t > self.near.t {

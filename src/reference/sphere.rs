@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 
 use super::exact;
 use super::line::{Line, Root, Roots, Surface, turns};
-use super::margin::{U, ratio, stored};
+use super::margin::ratio;
 use super::quadratic::Quadratic;
 use crate::scene;
 
@@ -76,32 +76,35 @@ struct Judge {
     b: f64,
     /// `S |f_i d_i| / |d|`.
     b_terms: f64,
-    /// The error of `r^2 - l^2`, in u.
+    /// The error of `r^2 - l^2`, in `u`.
     d: f64,
     /// The error that storing centre and radius leaves in `f.f - r^2`.
     stored: f64,
     dir: f64,
     margin: f64,
+    /// The error of one rounding.
+    u: f64,
 }
 
 impl Judge {
     fn new(sphere: &Sphere, line: &Line, f: DVec3, equation: &Quadratic) -> Judge {
         let (dir, distance, r) = (line.dir.length(), f.length(), sphere.radius);
         let e = line.anchor_error(sphere.center).length();
-        let stored = 2.0 * (distance * e + r * stored(r));
+        let stored = 2.0 * (distance * e + r * line.stored(r));
+        let u = line.u;
         let (b, b_terms) = (equation.b.abs() / dir, (f * line.dir).abs().element_sum() / dir);
         let l = f.cross(line.dir).length() / dir;
-        let plain = b_terms * b + equation.c.abs() + stored / U;
-        let lagrange = r * r + l * (distance + e / U) + stored / (2.0 * U) * (r / distance.max(r));
+        let plain = b_terms * b + equation.c.abs() + stored / u;
+        let lagrange = r * r + l * (distance + e / u) + stored / (2.0 * u) * (r / distance.max(r));
         let d = plain.min(lagrange);
         let slack = equation.discriminant / equation.a;
-        let h = slack.max(0.0).sqrt().max((U * d).sqrt());
-        Judge { h, b, b_terms, d, stored, dir, margin: ratio(slack, U * d) }
+        let h = slack.max(0.0).sqrt().max((u * d).sqrt());
+        Judge { h, b, b_terms, d, stored, dir, margin: ratio(slack, u * d), u }
     }
 
     /// The unit of a place `t`; `cancels`: it is the one that comes from `f.f - r^2`.
     fn unit(&self, t: f64, cancels: bool) -> f64 {
-        let relative = U * (1.0 + ratio(self.b_terms + ratio(self.d, 2.0 * self.h), self.b + self.h));
+        let relative = self.u * (1.0 + ratio(self.b_terms + ratio(self.d, 2.0 * self.h), self.b + self.h));
         let from_c = ratio(self.stored, (self.b + self.h) * self.dir);
         t.abs() * relative + if cancels { from_c } else { 0.0 }
     }

@@ -213,6 +213,7 @@ impl Batch {
                 self.distances[p] = samples.distances(&points);
             }
             wave.tile.packets[p] = rays.packet(&exact, count(p));
+            wave.tile.exact_mut()[p] = exact;
             if keep_exact {
                 wave.exact[p] = exact;
             }

@@ -119,6 +119,7 @@ pub struct Renderer<'s> {
     seed: u64,
     threads: usize,
     skips: SkipSet,
+    certify: bool,
     engine: Engine,
 }
 
@@ -172,6 +173,7 @@ impl<'s> Renderer<'s> {
             seed: scene.render.seed,
             threads: 0,
             skips: SkipSet::ALL,
+            certify: true,
             engine: Engine::Packet,
         })
     }
@@ -257,6 +259,12 @@ impl<'s> Renderer<'s> {
     /// Which kinds of work may be left out where they are not needed; the picture is the same to the bit.
     pub fn skips(mut self, skips: SkipSet) -> Self {
         self.skips = skips;
+        self
+    }
+
+    /// With `false`, f32 alone decides what rays meet, wrongly at times: for measuring what certainty costs.
+    pub fn certify(mut self, certify: bool) -> Self {
+        self.certify = certify;
         self
     }
 
@@ -375,7 +383,7 @@ impl<'s> Frame<'s> {
         plan.leave_out_layers(renderer.layers);
         let parts = plan.parts();
         let plan_seconds = start.elapsed().as_secs_f64();
-        let tree = Tree::new(parts, &plan.visible).one_by_one(renderer.engine == Engine::Single);
+        let tree = Tree::new(parts, &plan.visible).certify(renderer.certify).one_by_one(renderer.engine == Engine::Single);
         let build_seconds = start.elapsed().as_secs_f64() - plan_seconds;
         let image = &renderer.image;
         let display = (image.width, image.height);

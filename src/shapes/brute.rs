@@ -15,21 +15,27 @@ pub fn ray_against_rows(stores: &Stores, kind: Kind, ray: &Ray, cull: bool) -> V
     stores.visit(kind, ByBlock { rays: RayPacket::splat(ray), cull })
 }
 
-/// What one ray meets first: of equal places the lowest primitive, as the walks have it.
+/// What one ray meets first, and where the kernels put it: order and ties are those of f64.
 pub fn closest(stores: &Stores, ray: &Ray, cull: bool) -> Option<(f32, RowRef)> {
-    let mut best: Option<(f32, RowRef)> = None;
+    let exact = Ray64::exact(ray);
+    let mut best: Option<(f64, f32, RowRef)> = None;
     for kind in Kind::ALL {
         for (row, t) in ray_against_rows(stores, kind, ray, cull).into_iter().enumerate() {
-            let (Some(t), row) = (t, RowRef::new(kind, row)) else { continue };
-            best = Some(match best {
-                Some((other, _)) if t < other => (t, row),
-                Some((other, old)) if t == other => (t, stores.first_of(old, row)),
-                Some(old) => old,
-                None => (t, row),
-            });
+            let (Some(place), row) = (t, RowRef::new(kind, row)) else { continue };
+            let t = if cull { stores.decide(row, &exact) } else { stores.decide_any(row, &exact) };
+            let t = t.unwrap_or(f64::from(place));
+            let Some((other, _, old)) = best else {
+                best = Some((t, place, row));
+                continue;
+            };
+            let tie = (t - other).abs() <= stores.noise(row, &exact, t) + stores.noise(old, &exact, other);
+            let wins = if tie { stores.first_of(old, row) == row } else { t < other };
+            if wins {
+                best = Some((t, place, row));
+            }
         }
     }
-    best
+    best.map(|(_, place, row)| (place, row))
 }
 
 struct ByRow<'a> {
@@ -74,20 +80,20 @@ fn decided<P: Part>(
 ) -> [Option<f32>; LANES] {
     let anchor = P::anchor(rows, &rays.origin, |lane| store.part(row(lane)));
     let hidden = store.sides().lanes(&row);
-    let Hit8 { t, mask, doubt } = match cull {
-        true => P::hit::<true>(&anchor, rays, &hidden),
-        false => P::hit::<false>(&anchor, rays, &Hidden8::NONE),
+    let Hit8 { t, mask, doubt, .. } = match cull {
+        true => P::hit::<true, true>(&anchor, rays, &hidden),
+        false => P::hit::<false, true>(&anchor, rays, &Hidden8::NONE),
     };
     let lane = |lane: usize| {
-        if doubt.bits() >> lane & 1 == 0 {
-            return (mask.bits() >> lane & 1 == 1).then(|| t.to_array()[lane]);
+        let (place, bits) = (t.to_array()[lane], rays.lane(lane));
+        let kept = (mask.bits() >> lane & 1 == 1).then_some(place);
+        // The kernel tells of places that are past the end by their error too.
+        if doubt.bits() >> lane & 1 == 0 && kept.is_none_or(|t| t < bits.t_max * (1.0 - 1e-5)) {
+            return kept;
         }
         let i = row(lane);
         let visible = if cull { store.sides().row(i) } else { Visible::Both };
-        let (place, exact) = (t.to_array()[lane], Ray64::exact(&rays.lane(lane)));
-        let keeps = mask.bits() >> lane & 1 == 1;
-        let ray = if keeps { exact.endless() } else { exact };
-        store.part(i)?.decide(&ray, visible).map(|t| if keeps { place } else { t as f32 })
+        store.part(i)?.decide(&Ray64::exact(&bits), visible).map(|t| kept.unwrap_or(t as f32))
     };
     std::array::from_fn(lane)
 }

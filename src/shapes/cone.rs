@@ -43,7 +43,7 @@ impl Part for ConePart {
     /// quotient and product. Heights outside 0..height drop the mirror cone as well. Along the way the
     /// sign of `A t + B` says which side of the mantle a root meets.
     #[inline(always)]
-    fn hit<const CULL: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
+    fn hit<const CULL: bool, const CERTIFY: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
         let Anchor { f, error, axis, height, radius, slope } = *anchor;
         let p = f.dot(rays.dir) * rays.inv_dd;
         let g = rays.dir.mul_add(p, -f); // from the tip to the nearest point
@@ -55,7 +55,17 @@ impl Part for ConePart {
         let c = gx.dot(gx) - rho * rho;
         let disc = difference_of_products(b, b, a, c);
         let (speed2, size) = (turn.mul_add(turn, dx.dot(dx)), rho.mul_add(rho, gx.dot(gx)).sqrt());
-        let bound = speed2 * size * float8(6.0).mul_add(error, roundings(20.0) * size);
+        let mut bound = Float8::ZERO;
+        let (mut length, mut moved) = (Float8::ZERO, Float8::ZERO);
+        if CERTIFY {
+            // Places are off by `moved`, directions by a rounding of their whole length.
+            length = rays.inv_dd.sqrt();
+            length = float8(1.0) / length;
+            moved = error + roundings(8.0) * (g.abs().sum() + radius);
+            let turned = roundings(8.0) * length;
+            bound = speed2 * size * (float8(6.0).mul_add(moved, roundings(20.0) * size));
+            bound += float8(6.0) * speed2.sqrt() * size * size * turned;
+        }
         let possible = Mask8::ge(disc, -bound);
         if !possible.any() {
             return Hit8::none();
@@ -63,29 +73,52 @@ impl Part for ConePart {
         let root = copysign(disc.sqrt(), b);
         let z = -(b + root);
         let (t1, t2) = (z / a, c / z);
-        // Within this of its ends a mantle may or may not be met.
-        let rim = float8(2.0).mul_add(error, roundings(16.0) * (size + height))
-            + (dw.abs() * bound) / (speed2 * root.abs()).fast_max(float8(f32::MIN_POSITIVE));
-        let at_rim = |t: Float8| {
-            let w = t.mul_add(dw, gw);
-            rays.accepts(p + t) & (Mask8::le(w.abs(), rim) | Mask8::le((w - height).abs(), rim))
+        let w = |t: Float8| t.mul_add(dw, gw);
+        // A t^2 + 2 B t + C is off by what moves places times their distance from the axis, and t by that over half of
+        // its change.
+        let place = |t: Float8| {
+            if !CERTIFY {
+                return Float8::ZERO;
+            }
+            let reach = t.abs().mul_add(speed2.sqrt(), size);
+            let way = t.abs().mul_add(length, g.abs().sum());
+            let slip = roundings(13.0).mul_add(f.abs().sum(), error) / length;
+            let change = (disc.abs() - bound).fast_max(Float8::ZERO).sqrt();
+            reach * (moved + moved + roundings(20.0) * way) / change + slip + roundings(4.0) * t.abs()
         };
-        let silhouette = Mask8::le(disc.abs(), bound) & Mask8::gt(p + size / speed2.sqrt(), rays.t_min);
-        let doubt = silhouette | at_rim(t1) | at_rim(t2);
+        let (e1, e2) = (place(t1), place(t2));
+        let near_rim = |t: Float8, e: Float8| {
+            let rim = dw.abs().mul_add(e, moved) + roundings(16.0) * height;
+            Mask8::le(w(t).abs(), rim) | Mask8::le((w(t) - height).abs(), rim)
+        };
         // A t + B is -root at t1 and +root at t2: negative where the ray goes in.
         let first_enters = !Mask8::sign(root);
-        let ok = |t: Float8, enters: Mask8| {
-            let w = t.mul_add(dw, gw);
-            let mut ok = rays.accepts(p + t) & Mask8::ge(w, Float8::ZERO) & Mask8::le(w, height);
+        let ok = |t: Float8, e: Float8, enters: Mask8| {
+            let (mut ok, open) = rays.reaches(p + t, e);
+            let within = Mask8::ge(w(t), Float8::ZERO) & Mask8::le(w(t), height);
+            let rim = if CERTIFY { near_rim(t, e) } else { Mask8::NONE };
+            ok &= within | rim;
             if CULL {
                 ok &= !((enters & hidden.front) | (!enters & hidden.back));
             }
-            ok
+            (ok, ok & (open | rim))
         };
-        let (ok1, ok2) = (ok(t1, first_enters), ok(t2, !first_enters));
+        let ((ok1, open1), (ok2, open2)) = (ok(t1, e1, first_enters), ok(t2, e2, !first_enters));
         let far = float8(f32::INFINITY);
-        let t = p + ok1.select(t1, far).fast_min(ok2.select(t2, far));
-        Hit8 { t, mask: (ok1 | ok2) & !doubt, doubt }
+        let (u1, u2) = (ok1.select(t1, far), ok2.select(t2, far));
+        let first = Mask8::le(u1, u2);
+        let mut doubt = Mask8::NONE;
+        if CERTIFY {
+            // With a near 0 the one root is far away and of no certain sign.
+            let vague = Mask8::le(a.abs(), speed2 * roundings(16.0) + roundings(32.0) * length * speed2.sqrt());
+            let silhouette = possible & Mask8::le(disc.abs(), bound);
+            let widest = slope.mul_add(height, radius);
+            let half = (size + size + widest + widest + moved) / speed2.sqrt();
+            let near_ray = !Mask8::le(p + half, rays.t_min) & !Mask8::gt(p - half, rays.t_max);
+            doubt = ((silhouette & near_ray) | open1 | open2 | (vague & possible)) & rays.live();
+        }
+        let (t, error) = (p + first.select(u1, u2), first.select(e1, e2));
+        Hit8 { t, error, mask: (ok1 | ok2) & !doubt, doubt }
     }
 
     fn decide(&self, ray: &Ray64, visible: Visible) -> Option<f64> {

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::{Hidden8, Part, Ray64, Surface8, Surface64, nearer, roundings};
-use crate::lanes::{Float8, Hit8, Mask8, RayPacket, Vec3x8, float8};
+use crate::lanes::{Float8, Hit8, Mask8, RayPacket, UNIT_ROUNDOFF, Vec3x8, float8};
 use crate::plan::{BoxPart, Owner};
 use crate::scene::Visible;
 
@@ -12,6 +12,7 @@ use crate::scene::Visible;
 pub struct Anchor {
     min: Vec3x8,
     max: Vec3x8,
+    error: Vec3x8, // of both, by axis
 }
 
 impl Part for BoxPart {
@@ -25,13 +26,16 @@ impl Part for BoxPart {
 
     #[inline(always)]
     fn anchor<'a>(rows: &Self::Rows, origin: &Vec3x8, _: impl Fn(usize) -> Option<&'a Self>) -> Anchor {
-        Anchor { min: rows[0] - *origin, max: rows[1] - *origin }
+        let (min, max) = (rows[0] - *origin, rows[1] - *origin);
+        // Corners round with the scene, the difference once; a quotient three times, the direction's rounding included.
+        let corner = (rows[0].abs() + rows[1].abs()) * roundings(2.5);
+        Anchor { min, max, error: corner + (min.abs() + max.abs()) * roundings(5.5) }
     }
 
     #[inline(always)]
-    fn hit<const CULL: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
-        let (entry, exit) = slabs(anchor.min, anchor.max, rays.dir);
-        first_of::<CULL>(entry, exit, hidden, rays)
+    fn hit<const CULL: bool, const CERTIFY: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
+        let Anchor { min, max, error } = *anchor;
+        Stretch::new::<CERTIFY>(min, max, error, rays.dir, Float8::ZERO).first_of::<CULL, CERTIFY>(hidden, rays)
     }
 
     fn decide(&self, ray: &Ray64, visible: Visible) -> Option<f64> {
@@ -66,42 +70,110 @@ impl Part for BoxPart {
     }
 }
 
-/// Where rays from the origin of `min` and `max` enter and leave a box: `entry > exit` is a miss.
-///
-/// Source: Williams, Barrus, Morley and Shirley, "An efficient and robust ray-box intersection
-/// algorithm", Journal of Graphics Tools 10(1), 2005. A ray along a slab divides by a zero of either
-/// sign: it is inside everywhere or nowhere, its faces included.
-#[inline(always)]
-pub(super) fn slabs(min: Vec3x8, max: Vec3x8, dir: Vec3x8) -> (Float8, Float8) {
-    let axis = |lo: Float8, hi: Float8, d: Float8| {
-        let back = Mask8::sign(d);
-        let (near, far) = (back.select(hi, lo) / d, back.select(lo, hi) / d);
-        let along = Mask8::le(d.abs(), Float8::ZERO);
-        if !along.any() {
-            return (near, far);
-        }
-        let within = Mask8::le(lo, Float8::ZERO) & Mask8::ge(hi, Float8::ZERO);
+/// Where eight rays enter and leave eight boxes, and the bounds on both: `entry > exit` is a miss.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stretch {
+    entry: Float8,
+    exit: Float8,
+    /// Least and greatest place of the entry.
+    entry_bounds: [Float8; 2],
+    /// Least and greatest place of the exit.
+    exit_bounds: [Float8; 2],
+}
+
+impl Stretch {
+    /// For rays from the origin of `min` and `max`, which are known to `error` by axis; `turned` bounds what the
+    /// coordinates of `dir` are off by beyond their own rounding.
+    ///
+    /// Source: Williams, Barrus, Morley and Shirley, "An efficient and robust ray-box intersection
+    /// algorithm", Journal of Graphics Tools 10(1), 2005. A ray along a slab is inside everywhere or nowhere, its
+    /// faces included.
+    #[inline(always)]
+    pub fn new<const CERTIFY: bool>(min: Vec3x8, max: Vec3x8, error: Vec3x8, dir: Vec3x8, turned: Float8) -> Self {
         let infinity = float8(f32::INFINITY);
-        (along.select(within.select(-infinity, infinity), near), along.select(within.select(infinity, -infinity), far))
-    };
-    let (x, y, z) = (axis(min.x, max.x, dir.x), axis(min.y, max.y, dir.y), axis(min.z, max.z, dir.z));
-    (x.0.fast_max(y.0).fast_max(z.0), x.1.fast_min(y.1).fast_min(z.1))
-}
-
-/// The first of entry and exit that lies on the ray and is not hidden.
-#[inline(always)]
-pub(super) fn first_of<const CULL: bool>(entry: Float8, exit: Float8, hidden: &Hidden8, rays: &RayPacket) -> Hit8 {
-    let met = Mask8::le(entry, exit);
-    let mut entry_ok = rays.accepts(entry);
-    let mut exit_ok = rays.accepts(exit);
-    if CULL {
-        entry_ok &= !hidden.front;
-        exit_ok &= !hidden.back;
+        // A padding row is NaN, which minima may pass over: it ends before it begins.
+        let exit = Mask8::le(min.x, max.x).select(infinity, -infinity);
+        let mut all = Stretch { entry: -infinity, exit, entry_bounds: [-infinity; 2], exit_bounds: [exit; 2] };
+        all.cut::<CERTIFY>(min.x, max.x, error.x, dir.x, turned);
+        all.cut::<CERTIFY>(min.y, max.y, error.y, dir.y, turned);
+        all.cut::<CERTIFY>(min.z, max.z, error.z, dir.z, turned);
+        all
     }
-    Hit8 { t: entry_ok.select(entry, exit), mask: met & (entry_ok | exit_ok), doubt: Mask8::NONE }
+
+    /// Leaves what is between two faces.
+    #[inline(always)]
+    fn cut<const CERTIFY: bool>(&mut self, lo: Float8, hi: Float8, error: Float8, d: Float8, turned: Float8) {
+        let back = Mask8::sign(d);
+        let infinity = float8(f32::INFINITY);
+        let (mut near, mut far) = (back.select(hi, lo) / d, back.select(lo, hi) / d);
+        let along = Mask8::le(d.abs(), Float8::ZERO);
+        let inside = |slack: Float8| Mask8::le(lo - slack, Float8::ZERO) & Mask8::ge(hi + slack, Float8::ZERO);
+        if along.any() {
+            let within = inside(Float8::ZERO);
+            near = along.select(within.select(-infinity, infinity), near);
+            far = along.select(within.select(infinity, -infinity), far);
+        }
+        (self.entry, self.exit) = (near.fast_max(self.entry), far.fast_min(self.exit));
+        if !CERTIFY {
+            return;
+        }
+        let inv = float8(1.0) / (d.abs() - turned).fast_max(Float8::ZERO);
+        let near_error = turned.mul_add(near.abs(), error) * inv;
+        let far_error = turned.mul_add(far.abs(), error) * inv;
+        let mut near = [near - near_error, near + near_error];
+        let mut far = [far - far_error, far + far_error];
+        // Where the direction may be along the slab, all there is to know is whether the origin is inside.
+        let along = Mask8::le(d.abs(), turned);
+        if along.any() {
+            let (outer, inner) = (inside(error), inside(-error));
+            let open = |mask: Mask8, yes: Float8, no: Float8, lane: Float8| along.select(mask.select(yes, no), lane);
+            // Not along it for certain, the ray may leave the slab anywhere.
+            let sure = inner & Mask8::le(turned, Float8::ZERO);
+            let maybe = outer | Mask8::gt(turned, Float8::ZERO);
+            near = [open(maybe, -infinity, infinity, near[0]), open(sure, -infinity, infinity, near[1])];
+            far = [open(sure, infinity, -infinity, far[0]), open(maybe, infinity, -infinity, far[1])];
+        }
+        for k in 0..2 {
+            self.entry_bounds[k] = near[k].fast_max(self.entry_bounds[k]);
+            self.exit_bounds[k] = far[k].fast_min(self.exit_bounds[k]);
+        }
+    }
+
+    /// The first of entry and exit that lies on the ray and is not hidden.
+    #[inline(always)]
+    pub fn first_of<const CULL: bool, const CERTIFY: bool>(&self, hidden: &Hidden8, rays: &RayPacket) -> Hit8 {
+        let Stretch { entry, exit, entry_bounds, exit_bounds } = *self;
+        let met = Mask8::le(entry, exit);
+        if !CERTIFY {
+            let (mut entry_ok, mut exit_ok) = (rays.accepts(entry), rays.accepts(exit));
+            if CULL {
+                entry_ok &= !hidden.front;
+                exit_ok &= !hidden.back;
+            }
+            let (t, mask) = (entry_ok.select(entry, exit), met & (entry_ok | exit_ok));
+            return Hit8 { t, error: Float8::ZERO, mask, doubt: Mask8::NONE };
+        }
+        let possible = !Mask8::gt(entry_bounds[0], exit_bounds[1]) & rays.live();
+        if !possible.any() {
+            return Hit8::none();
+        }
+        let on = |[low, high]: [Float8; 2]| possible & Mask8::gt(high, rays.t_min) & Mask8::le(low, rays.t_max);
+        let (mut entry_ok, mut exit_ok) = (on(entry_bounds), on(exit_bounds));
+        if CULL {
+            entry_ok &= !hidden.front;
+            exit_ok &= !hidden.back;
+        }
+        let any = entry_ok | exit_ok;
+        let low = entry_ok.select(entry_bounds[0], exit_bounds[0]);
+        let high = entry_ok.select(entry_bounds[1], exit_bounds[1]);
+        let t = entry_ok.select(entry, exit);
+        let error = (high - t).fast_max(t - low) * float8(1.0 + 4.0 * UNIT_ROUNDOFF);
+        let sure = Mask8::le(entry_bounds[1], exit_bounds[0]) & met & Mask8::gt(low, rays.t_min);
+        Hit8 { t, error, mask: any & sure, doubt: any & !sure }
+    }
 }
 
-/// [`slabs`] in f64.
+/// Entry and exit of one ray in f64: `entry > exit` is a miss.
 pub(super) fn slabs64(min: DVec3, max: DVec3, dir: DVec3) -> (f64, f64) {
     let (mut entry, mut exit) = (f64::NEG_INFINITY, f64::INFINITY);
     for k in 0..3 {

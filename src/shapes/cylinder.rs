@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 
 use super::sphere::copysign;
 use super::{Hidden8, Part, Ray64, Surface8, Surface64, nearer, roundings};
-use crate::lanes::{Float8, Hit8, Mask8, RayPacket, Vec3x8, float8};
+use crate::lanes::{Float8, Hit8, Mask8, RayPacket, Vec3x8};
 use crate::plan::{CylinderPart, Owner};
 use crate::scene::{Visible, basis};
 
@@ -18,7 +18,7 @@ pub struct Anchor {
     height: Float8,
     r2: Float8,
     error: Float8, // of f, the rounding of the scene included
-    bound: Float8, // of the slack below
+    slip: Float8,  // of places along a ray of length 1
 }
 
 impl Part for CylinderPart {
@@ -35,9 +35,8 @@ impl Part for CylinderPart {
         let ([base, axis], [height, radius]) = *rows;
         let f = base - *origin;
         let error = roundings(6.0) * ((base.abs() + f.abs()).sum() + height);
-        let r2 = radius * radius;
-        let bound = (radius + radius).mul_add(error, error * error) + roundings(24.0) * r2;
-        Anchor { f, axis, height, r2, error, bound }
+        let slip = roundings(13.0).mul_add(f.abs().sum(), error);
+        Anchor { f, axis, height, r2: radius * radius, error, slip }
     }
 
     /// The sphere's test in the plane across the axis, from the ray's point nearest the base, where the
@@ -45,42 +44,70 @@ impl Part for CylinderPart {
     ///
     /// Source: after Haines, Günther and Akenine-Möller, Ray Tracing Gems, 2019, chapter 7.
     #[inline(always)]
-    fn hit<const CULL: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
-        let Anchor { f, axis, height, r2, error, bound } = *anchor;
+    fn hit<const CULL: bool, const CERTIFY: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
+        let Anchor { f, axis, height, r2, error, slip } = *anchor;
         let p = f.dot(rays.dir) * rays.inv_dd;
         let q = rays.dir.mul_add(-p, f);
         let (da, qa) = (rays.dir.dot(axis), q.dot(axis));
         let (d2, q2) = (axis.mul_add(-da, rays.dir), axis.mul_add(-qa, q));
-        let (qd, dd) = (q2.dot(d2), d2.dot(d2));
+        let (qd, dd, qq) = (q2.dot(d2), d2.dot(d2), q2.dot(q2));
         let perp = d2.mul_add(-(qd / dd), q2);
         let slack = r2 - perp.dot(perp);
-        if !Mask8::ge(slack, -bound).any() {
+        let mut bound = Float8::ZERO;
+        let mut across = Float8::ZERO; // error of a place across the axis
+        if CERTIFY {
+            // What is left of the direction across the axis is off by roundings of the whole of it, which turns it.
+            let turned = roundings(8.0) * (qq / (dd * rays.inv_dd)).sqrt();
+            across = error + turned + roundings(8.0) * q.abs().sum();
+            let radius = r2.sqrt();
+            bound = (radius + radius + across).mul_add(across, roundings(24.0) * r2);
+        }
+        // A ray along the axis is across it nowhere: all is open.
+        let possible = !Mask8::lt(slack, -bound);
+        if !possible.any() {
             return Hit8::none();
         }
         let s = (slack * dd).sqrt();
         let z = qd + copysign(s, qd);
-        let (a, b) = (z / dd, (q2.dot(q2) - r2) / z);
+        let (a, b) = (z / dd, (qq - r2) / z);
         let (entry, exit) = (a.fast_min(b), a.fast_max(b));
-        let within = |t: Float8| {
-            let w = t.mul_add(da, -qa);
-            Mask8::ge(w, Float8::ZERO) & Mask8::le(w, height)
+        let w = |t: Float8| t.mul_add(da, -qa);
+        let within = |t: Float8| Mask8::ge(w(t), Float8::ZERO) & Mask8::le(w(t), height);
+        let mut place = Float8::ZERO;
+        let mut rim = Float8::ZERO;
+        if CERTIFY {
+            let (inv_len, size) = (rays.inv_dd.sqrt(), qq.sqrt() + r2.sqrt());
+            let product = size * (across + across + roundings(6.0) * size) / z.abs();
+            place = bound / s + product + (across + roundings(6.0) * size) / dd.sqrt() + slip * inv_len;
+            place = a.abs().mul_add(roundings(10.0), place);
+            rim = da.abs().mul_add(place, error) + roundings(16.0) * height + roundings(8.0) * q.abs().sum();
+        }
+        let reaches = |t: Float8| {
+            let (met, open) = rays.reaches(p + t, place);
+            let near_rim = Mask8::le(w(t).abs(), rim) | Mask8::le((w(t) - height).abs(), rim);
+            if CERTIFY {
+                ((within(t) | near_rim) & met, (open | near_rim) & (within(t) | near_rim) & met)
+            } else {
+                (within(t) & met, Mask8::NONE)
+            }
         };
-        // Within this of its ends a mantle may or may not be met.
-        let rim = error + roundings(16.0) * height + (da.abs() * bound) / s.fast_max(float8(f32::MIN_POSITIVE));
-        let at_rim = |t: Float8| {
-            let w = t.mul_add(da, -qa);
-            rays.accepts(p + t) & (Mask8::le(w.abs(), rim) | Mask8::le((w - height).abs(), rim))
-        };
-        let middle = qd / dd;
-        let silhouette = Mask8::le(slack.abs(), bound) & Mask8::gt(p + middle + (bound / dd).sqrt(), rays.t_min);
-        let doubt = silhouette | at_rim(entry) | at_rim(exit);
-        let mut entry_ok = rays.accepts(p + entry) & within(entry);
-        let mut exit_ok = rays.accepts(p + exit) & within(exit);
+        let ((mut entry_ok, mut entry_open), (mut exit_ok, mut exit_open)) = (reaches(entry), reaches(exit));
         if CULL {
             entry_ok &= !hidden.front;
+            entry_open &= !hidden.front;
             exit_ok &= !hidden.back;
+            exit_open &= !hidden.back;
         }
-        Hit8 { t: entry_ok.select(p + entry, p + exit), mask: (entry_ok | exit_ok) & !doubt, doubt }
+        let t = p + entry_ok.select(entry, exit);
+        let mut doubt = Mask8::NONE;
+        if CERTIFY {
+            let silhouette = !Mask8::gt(slack, bound) & possible;
+            let half = ((bound + slack.abs()) / dd).sqrt() + place;
+            let near_ray = !Mask8::le(p + qd / dd + half, rays.t_min) & !Mask8::gt(p + qd / dd - half, rays.t_max);
+            // Whatever is open at one end may be the first hit, or leave the other end that.
+            doubt = ((silhouette & near_ray) | entry_open | exit_open) & rays.live();
+        }
+        Hit8 { t, error: place, mask: (entry_ok | exit_ok) & possible & !doubt, doubt }
     }
 
     fn decide(&self, ray: &Ray64, visible: Visible) -> Option<f64> {

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
-use super::plane::{flat_surface, flat_surface64, shows, side_hidden};
+use super::plane::{Crossing, flat_surface, flat_surface64, height_error, shows, side_hidden};
 use super::{Hidden8, Part, Ray64, Surface8, Surface64, roundings};
 use crate::lanes::{Float8, Hit8, Mask8, RayPacket, Vec3x8};
 use crate::plan::{DiskPart, Owner};
@@ -16,6 +16,7 @@ use crate::scene::{Visible, basis};
 pub struct Anchor {
     f: Vec3x8,      // from the origin to the center
     height: Float8, // n . f
+    error: Float8,  // of the height
     normal: Vec3x8,
     radius: Float8,
     inner: Float8,
@@ -36,35 +37,41 @@ impl Part for DiskPart {
         let ([center, normal], [radius, inner]) = *rows;
         let f = center - *origin;
         let reach = (center.abs() + f.abs()).sum();
-        Anchor { f, height: normal.dot(f), normal, radius, inner, reach }
+        Anchor { f, height: normal.dot(f), error: height_error(normal, center, f), normal, radius, inner, reach }
     }
 
     /// The plane of equation (6), then (7) and (8) of the paper with the vector from the centre formed as
     /// `t dir - f`, so that nothing large cancels: Kucherov, Morgun and Golenkovskaya, 2016, section IV B.
     #[inline(always)]
-    fn hit<const CULL: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
+    fn hit<const CULL: bool, const CERTIFY: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
         let nd = anchor.normal.dot(rays.dir);
-        let t = anchor.height / nd;
-        let mut on_ray = rays.accepts(t);
+        let crossing = Crossing::new::<CERTIFY>(anchor.height, anchor.error, nd, rays.dir.abs().sum());
+        let (mut on_ray, mut open) = crossing.on::<CERTIFY>(rays);
         if CULL {
-            on_ray &= !side_hidden(nd, hidden);
+            on_ray &= !side_hidden(nd, hidden) | open;
         }
         if !on_ray.any() {
             return Hit8::none();
         }
-        let x = rays.dir.mul_add(t, -anchor.f);
+        let x = rays.dir.mul_add(crossing.t, -anchor.f);
         let rho2 = x.dot(x);
-        // The plane's roundings move x along the ray, by |dir|/|n . dir| of what they move the plane.
-        let dd = rays.dir.dot(rays.dir);
-        let shift = roundings(4.0) * anchor.reach * (Float8::ONE + (dd / (nd * nd)).sqrt());
-        let near_rim = |r: Float8| {
-            let bound = (shift + roundings(4.0) * r) * (r + r + shift);
-            Mask8::le((rho2 - r * r).abs(), bound)
-        };
         let inside = Mask8::le(rho2, anchor.radius * anchor.radius) & Mask8::ge(rho2, anchor.inner * anchor.inner);
-        let hole = Mask8::gt(anchor.inner, Float8::ZERO);
-        let doubt = on_ray & (near_rim(anchor.radius) | (near_rim(anchor.inner) & hole));
-        Hit8 { t, mask: (on_ray & inside) | doubt, doubt }
+        let mut doubt = Mask8::NONE;
+        if CERTIFY {
+            // The error of t moves x along the ray; the rest is what center, origin and direction round by.
+            let len = rays.dir.dot(rays.dir).sqrt();
+            let shift = (crossing.error * len).mul_add(Float8::ONE, roundings(4.0) * anchor.reach);
+            let near_rim = |r: Float8| {
+                let shift = roundings(8.0).mul_add(r, shift);
+                Mask8::le((rho2 - r * r).abs(), shift * (r + r + shift) * Float8::splat(1.25))
+            };
+            let hole = Mask8::gt(anchor.inner, Float8::ZERO);
+            doubt = on_ray & (near_rim(anchor.radius) | (near_rim(anchor.inner) & hole));
+            // Beside the plane nothing is known; past the start it is open only what may be inside.
+            open &= inside | doubt | crossing.beside;
+            doubt |= open;
+        }
+        Hit8 { t: crossing.t, error: crossing.error, mask: ((on_ray & inside) | doubt) & !open, doubt }
     }
 
     fn decide(&self, ray: &Ray64, visible: Visible) -> Option<f64> {

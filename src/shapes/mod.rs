@@ -26,7 +26,7 @@ use glam::{DVec2, DVec3};
 pub use self::store::{Hidden8, Store};
 pub use self::stores::{Groups, RowRef, Stores, Visit};
 
-use crate::lanes::{Columns, Float8, Hit8, Mask8, Ray, RayPacket, Vec3x8, float8};
+use crate::lanes::{Columns, ExactPacket, Float8, Hit8, Mask8, Ray, RayPacket, Vec3x8, float8};
 use crate::plan::Owner;
 use crate::scene::Visible;
 
@@ -43,8 +43,9 @@ pub trait Part: Clone + Send + Sync {
     fn anchor<'a>(rows: &Self::Rows, origin: &Vec3x8, part: impl Fn(usize) -> Option<&'a Self>) -> Self::Anchor
     where
         Self: 'a;
-    /// First hit with `t_min < t <= t_max`; with `CULL` hidden sides are not met.
-    fn hit<const CULL: bool>(anchor: &Self::Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8;
+    /// First hit with `t_min < t <= t_max`; with `CULL` hidden sides are not met. With `CERTIFY` it says what f32
+    /// cannot tell: the error of `t`, which hits within that of the end of the ray are told of too, and doubts.
+    fn hit<const CULL: bool, const CERTIFY: bool>(anchor: &Self::Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8;
     /// The f64 answer where the kernel is in doubt: touching counts as a hit.
     fn decide(&self, ray: &Ray64, visible: Visible) -> Option<f64>;
     /// The hit near `t` again, in f64.
@@ -115,15 +116,19 @@ impl Ray64 {
         Ray64 { origin, dir, t_min: f64::from(ray.t_min), t_max: f64::from(ray.t_max) }
     }
 
-    /// The whole line.
-    pub fn endless(self) -> Self {
-        Ray64 { t_min: f64::NEG_INFINITY, t_max: f64::INFINITY, ..self }
+    /// With origin and direction of one ray of eight.
+    pub fn from(self, rays: &ExactPacket, lane: usize) -> Self {
+        let (origin, dir) = rays.lane(lane);
+        Ray64 { origin, dir, ..self }
     }
 
-    /// Whether a hit at `t` lies on the ray. Hits are stored in f32, and so they are compared: else of two
-    /// hits at the same place the second would lie beyond the first where that was rounded down.
+    /// Without an end.
+    pub fn endless(self) -> Self {
+        Ray64 { t_max: f64::INFINITY, ..self }
+    }
+
+    /// Whether a hit at `t` lies on the ray.
     pub fn accepts(&self, t: f64) -> bool {
-        let t = f64::from(t as f32);
         self.t_min < t && t <= self.t_max
     }
 
@@ -138,6 +143,20 @@ impl Ray64 {
         let entry = Some(entry).filter(|t| visible != Visible::Back && self.accepts(*t));
         entry.or_else(|| Some(exit).filter(|t| visible != Visible::Front && self.accepts(*t)))
     }
+}
+
+/// What f64 may be off by where a ray meets a part at `t`: some roundings of all the numbers involved, over the cosine
+/// at which the ray meets the surface.
+pub fn noise<P: Part>(part: &P, ray: &Ray64, t: f64) -> f64 {
+    let way = t.abs() * ray.dir.abs().element_sum();
+    let (low, high) = part.bounds();
+    let extent = low.abs().max(high.abs()).max_element();
+    let extent = if extent.is_finite() { extent } else { 0.0 };
+    let moved = 16.0 * f64::EPSILON * (ray.origin.abs().element_sum() + way + extent);
+    let speed = part.refine(ray, t).normal.dot(ray.dir).abs();
+    let noise = moved / speed;
+    // Where a ray grazes a round surface the square root of it is what opens.
+    if noise.is_finite() { noise.min(1e-6 * t.abs() + moved) } else { 1e-6 * t.abs() }
 }
 
 /// The one of two roots that is nearer to `t`.

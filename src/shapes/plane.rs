@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::{Hidden8, Part, Ray64, Surface8, Surface64, roundings};
-use crate::lanes::{Float8, Hit8, Mask8, RayPacket, Vec3x8};
+use crate::lanes::{Float8, Hit8, Mask8, RayPacket, Vec3x8, float8};
 use crate::plan::{Owner, PlanePart};
 use crate::scene::{Visible, basis};
 
@@ -11,6 +11,7 @@ use crate::scene::{Visible, basis};
 #[derive(Debug, Clone, Copy)]
 pub struct Anchor {
     height: Float8, // n . (point - origin)
+    error: Float8,  // of the height, the rounding of the scene included
     normal: Vec3x8,
 }
 
@@ -25,7 +26,8 @@ impl Part for PlanePart {
 
     fn anchor<'a>(rows: &Self::Rows, origin: &Vec3x8, _: impl Fn(usize) -> Option<&'a Self>) -> Anchor {
         let [point, normal] = *rows;
-        Anchor { height: normal.dot(point - *origin), normal }
+        let f = point - *origin;
+        Anchor { height: normal.dot(f), error: height_error(normal, point, f), normal }
     }
 
     /// `t = n . (point - origin) / n . dir`: equation (6) of the paper with its sign put right. A ray in
@@ -34,14 +36,14 @@ impl Part for PlanePart {
     /// Source: Kucherov, Morgun and Golenkovskaya, "A visualization of 3D images by back ray tracing:
     /// the geometric approach", 2016, section IV A.
     #[inline(always)]
-    fn hit<const CULL: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
+    fn hit<const CULL: bool, const CERTIFY: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
         let nd = anchor.normal.dot(rays.dir);
-        let t = anchor.height / nd;
-        let mut mask = rays.accepts(t) & Mask8::lt(t, Float8::splat(f32::INFINITY));
+        let crossing = Crossing::new::<CERTIFY>(anchor.height, anchor.error, nd, rays.dir.abs().sum());
+        let (mut mask, doubt) = crossing.on::<CERTIFY>(rays);
         if CULL {
-            mask &= !side_hidden(nd, hidden);
+            mask &= !side_hidden(nd, hidden) | doubt;
         }
-        Hit8 { t, mask, doubt: Mask8::NONE }
+        Hit8 { t: crossing.t, error: crossing.error, mask: mask & !doubt, doubt }
     }
 
     fn decide(&self, ray: &Ray64, visible: Visible) -> Option<f64> {
@@ -71,6 +73,51 @@ impl Part for PlanePart {
 
     fn owner(&self) -> Owner {
         self.owner
+    }
+}
+
+/// The error of `n . f`, where f goes from the ray's origin to `anchor`: the anchor rounds with the scene, f with the
+/// subtraction, the normal and the products each once, the sum three times.
+#[inline(always)]
+pub(super) fn height_error(normal: Vec3x8, anchor: Vec3x8, f: Vec3x8) -> Float8 {
+    let (anchor, f) = (anchor.abs(), f.abs());
+    normal.abs().dot(f * roundings(9.0) + anchor * roundings(2.5))
+}
+
+/// Where eight rays cross eight planes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Crossing {
+    pub t: Float8,
+    pub error: Float8,
+    /// Lanes in which the ray may as well run beside the plane: nothing is known of `t` there.
+    pub beside: Mask8,
+}
+
+impl Crossing {
+    /// `height` is known to `error`, `nd` to six roundings of the direction's 1-norm, its own rounding included.
+    #[inline(always)]
+    pub fn new<const CERTIFY: bool>(height: Float8, error: Float8, nd: Float8, dir: Float8) -> Self {
+        let inv = float8(1.0) / nd;
+        let t = height * inv;
+        if !CERTIFY {
+            return Crossing { t, error: Float8::ZERO, beside: Mask8::NONE };
+        }
+        let slip = roundings(6.0) * dir;
+        // Where slip is a quarter of n . dir at most, 4/3 stands for what is of second order.
+        let first = t.abs().mul_add(slip, error) * (inv.abs() * float8(4.0 / 3.0));
+        let error = t.abs().mul_add(roundings(2.0), first);
+        Crossing { t, error, beside: Mask8::le(nd.abs(), slip * float8(4.0)) }
+    }
+
+    /// Lanes that may be met, and among them those in which that is open.
+    #[inline(always)]
+    pub fn on<const CERTIFY: bool>(&self, rays: &RayPacket) -> (Mask8, Mask8) {
+        let (met, open) = rays.reaches(self.t, self.error);
+        if !CERTIFY {
+            return (met & Mask8::lt(self.t, float8(f32::INFINITY)), Mask8::NONE);
+        }
+        let beside = self.beside & rays.live();
+        (met | beside, open | beside)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::plane::{flat_surface, flat_surface64, shows, side_hidden};
+use super::plane::{Crossing, flat_surface, flat_surface64, height_error, shows, side_hidden};
 use super::{Hidden8, Part, Ray64, Surface8, Surface64, roundings};
 use crate::lanes::{Float8, Hit8, Mask8, RayPacket, Vec3x8};
 use crate::plan::{Owner, PolygonPart};
@@ -12,6 +12,7 @@ use crate::scene::Visible;
 #[derive(Debug, Clone, Copy)]
 pub struct Anchor<const N: usize> {
     height: Float8, // n . (first corner - origin)
+    error: Float8,  // of the height
     normal: Vec3x8,
     edges: [Vec3x8; N], // a x (b - a) for each edge ab seen from the origin
     bound: Float8,      // error of dir . edge for |dir|_1 = 1, the rounding of the scene included
@@ -42,9 +43,12 @@ impl<const N: usize> Part for PolygonPart<N> {
             reach = reach.fast_max(a[k].abs().sum() + corners[k].abs().sum());
             size = size.fast_max(side[k].abs().sum());
         }
-        // Corners round with the scene, a with the subtraction, the product and the sum three times.
-        let bound = roundings(8.0) * reach * size;
-        Anchor { height: normal.dot(a[0]), normal: *normal, edges, bound }
+        // Corners round with the scene, a with the subtraction: each moves an edge by two of its roundings, and turns
+        // it by as much over the widest way across, of which two edges make one of four corners, four one of eight.
+        // Products, sum and direction round six times.
+        let bound = roundings(if N > 4 { 18.0 } else { 12.0 }) * reach * size;
+        let error = height_error(*normal, corners[0], a[0]);
+        Anchor { height: normal.dot(a[0]), error, normal: *normal, edges, bound }
     }
 
     /// The ray passes each edge ab on the same side: the sign of `dir . (a x b)`, with a and b seen from
@@ -55,7 +59,7 @@ impl<const N: usize> Part for PolygonPart<N> {
     /// Source: equation (10) of Kucherov, Morgun and Golenkovskaya, 2016, section IV C, with the origin
     /// moved to the ray's, without which it depends on where the scene lies.
     #[inline(always)]
-    fn hit<const CULL: bool>(anchor: &Anchor<N>, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
+    fn hit<const CULL: bool, const CERTIFY: bool>(anchor: &Anchor<N>, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
         let nd = anchor.normal.dot(rays.dir);
         // Seen from the front the edge products are negative; the sign of n . dir makes them positive.
         let flip = Mask8::sign(nd);
@@ -64,19 +68,24 @@ impl<const N: usize> Part for PolygonPart<N> {
             let e = edge.dot(rays.dir);
             least = least.fast_min(flip.select(-e, e));
         }
-        let dir = rays.dir.abs();
-        let bound = anchor.bound * (dir.x + dir.y + dir.z);
+        let dir = rays.dir.abs().sum();
+        let bound = if CERTIFY { anchor.bound * dir } else { Float8::ZERO };
         let mut possible = Mask8::ge(least, -bound);
         if !possible.any() {
             return Hit8::none();
         }
-        let t = anchor.height / nd;
-        possible &= rays.accepts(t) & Mask8::lt(t, Float8::splat(f32::INFINITY));
+        let crossing = Crossing::new::<CERTIFY>(anchor.height, anchor.error, nd, dir);
+        let (met, mut open) = crossing.on::<CERTIFY>(rays);
+        possible &= met;
         if CULL {
-            possible &= !side_hidden(nd, hidden);
+            possible &= !side_hidden(nd, hidden) | open;
         }
-        let doubt = possible & Mask8::le(least, bound);
-        Hit8 { t, mask: possible, doubt }
+        open &= possible;
+        let mut doubt = open;
+        if CERTIFY {
+            doubt |= possible & Mask8::le(least, bound);
+        }
+        Hit8 { t: crossing.t, error: crossing.error, mask: possible & !open, doubt }
     }
 
     fn decide(&self, ray: &Ray64, visible: Visible) -> Option<f64> {

@@ -17,6 +17,7 @@ pub struct Anchor {
     c: Float8,     // |f|^2 - r^2, which does not cancel
     near: Mask8,   // origins whose distance from the surface is small beside the radius
     bound: Float8, // error of the slack below, the rounding of the scene to f32 included
+    slip: Float8,  // of places along a ray of length 1, likewise
 }
 
 impl Part for SpherePart {
@@ -38,11 +39,15 @@ impl Part for SpherePart {
         if near.any() {
             c = near_products(near, c, origin, part);
         }
-        // |c| rounds with the scene, f with the subtraction; 1-norms stand for lengths.
-        let reach = (center.abs() + f.abs()).sum();
+        // The center rounds with the scene, f with the subtraction, and the direction moves the ray by a rounding
+        // of f beside the center; 1-norms stand for lengths.
+        let (from, to) = (center.abs().sum(), f.abs().sum());
+        let reach = from + to;
         let far = roundings(6.0) * reach;
-        let bound = roundings(24.0) * r2 + roundings(3.0) * radius * reach + far * far;
-        Anchor { f, r2, c, near, bound }
+        let bound = roundings(24.0) * r2 + roundings(4.5) * radius * reach + far * far;
+        // 13 of it for the closest approach; the nearer root takes as many again from c over z.
+        let slip = roundings(26.0).mul_add(to, roundings(8.0) * from);
+        Anchor { f, r2, c, near, bound, slip }
     }
 
     /// Shapes: eight lanes throughout. Units: `t` counts lengths of `dir`, which need not be 1.
@@ -53,8 +58,9 @@ impl Part for SpherePart {
     /// from the product of both. Close to a surface that is large beside the distance, that distance
     /// says nothing and the discriminant is formed from compensated products instead.
     #[inline(always)]
-    fn hit<const CULL: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
-        let Anchor { f, r2, c, near, bound } = *anchor;
+    fn hit<const CULL: bool, const CERTIFY: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
+        let Anchor { f, r2, c, near, bound, slip } = *anchor;
+        let bound = if CERTIFY { bound } else { Float8::ZERO };
         let fd = f.dot(rays.dir);
         let p = fd * rays.inv_dd;
         let perp = rays.dir.mul_add(-p, f); // from the closest approach to the center
@@ -67,25 +73,46 @@ impl Part for SpherePart {
         if !possible.any() {
             return Hit8::none();
         }
-        let doubt = possible & Mask8::le(slack, bound);
         let dd = rays.dir.dot(rays.dir);
         let s = (slack * dd).sqrt(); // NaN outside, and NaN fails every comparison
         let z = fd + copysign(s, fd);
         let (a, b) = (z * rays.inv_dd, c / z);
         let (entry, exit) = (a.fast_min(b), a.fast_max(b));
-        let mut entry_ok = rays.accepts(entry);
-        let mut exit_ok = rays.accepts(exit);
+        let (mut entry_error, mut exit_error) = (Float8::ZERO, Float8::ZERO);
+        let mut edge = Float8::ZERO;
+        if CERTIFY {
+            edge = slip * rays.inv_dd.sqrt();
+            let error = a.abs().mul_add(roundings(8.0), bound / s + edge);
+            (entry_error, exit_error) = (error, error);
+            if near.any() {
+                // Here c is as good as its own rounding, and so is the smaller root, whose sign is certain.
+                let small = b.abs() * (error / a.abs() + roundings(4.0));
+                let small = near.select(small.fast_min(error), error);
+                let first = Mask8::lt(a, b);
+                (entry_error, exit_error) = (first.select(error, small), first.select(small, error));
+            }
+        }
+        let (mut entry_ok, mut entry_open) = rays.reaches(entry, entry_error);
+        let (mut exit_ok, exit_open) = rays.reaches(exit, exit_error);
         if CULL {
             entry_ok &= !hidden.front;
+            entry_open &= !hidden.front;
             exit_ok &= !hidden.back;
         }
-        let hit = Hit8 { t: entry_ok.select(entry, exit), mask: entry_ok | exit_ok, doubt: Mask8::NONE };
-        if !doubt.any() {
-            return hit;
+        let (t, error) = (entry_ok.select(entry, exit), entry_ok.select(entry_error, exit_error));
+        let mask = entry_ok | exit_ok;
+        if !CERTIFY {
+            return Hit8 { t, error, mask, doubt: Mask8::NONE };
         }
-        let half = ((slack.abs() + bound) * rays.inv_dd).sqrt(); // no root lies further from p
-        let doubt = doubt & Mask8::gt(p + half, rays.t_min) & Mask8::le(p - half, rays.t_max);
-        Hit8 { mask: hit.mask & !doubt, doubt, ..hit }
+        let mut doubt = entry_open | (exit_ok & !entry_ok & exit_open);
+        let silhouette = possible & Mask8::le(slack, bound);
+        if silhouette.any() {
+            // No root lies further from p.
+            let half = ((slack.abs() + bound) * rays.inv_dd).sqrt() + edge;
+            let near_ray = Mask8::gt(p + half, rays.t_min) & Mask8::le(p - half, rays.t_max);
+            doubt = (doubt & !silhouette) | (silhouette & near_ray);
+        }
+        Hit8 { t, error, mask: mask & !doubt & !silhouette, doubt }
     }
 
     fn decide(&self, ray: &Ray64, visible: Visible) -> Option<f64> {

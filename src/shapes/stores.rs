@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{Part, Ray64, Store, Surface8, Surface64};
+use super::{Part, Ray64, Store, Surface8, Surface64, noise};
 use crate::lanes::{Float8, LANES, Mask8, RayPacket};
 use crate::plan::{
     BoxPart, ConePart, CylinderPart, DiskPart, Kind, Owner, Parts, PlanePart, PolygonPart, SpherePart, TurnedBoxPart,
@@ -22,6 +22,8 @@ pub struct Stores {
     turned_boxes: Store<TurnedBoxPart>,
     cylinders: Store<CylinderPart>,
     cones: Store<ConePart>,
+    /// Whether what f32 leaves open is decided in f64.
+    certify: bool,
 }
 
 /// Sizes of the groups that the parts of each kind stand in.
@@ -59,7 +61,19 @@ impl Stores {
             turned_boxes: store(Kind::TurnedBox, parts.turned_boxes, groups, visible),
             cylinders: store(Kind::Cylinder, parts.cylinders, groups, visible),
             cones: store(Kind::Cone, parts.cones, groups, visible),
+            certify: true,
         }
+    }
+
+    /// Whether what f32 leaves open is decided in f64, as it should be.
+    #[inline(always)]
+    pub fn certify(&self) -> bool {
+        self.certify
+    }
+
+    /// With `false`, f32 alone decides.
+    pub fn set_certify(&mut self, certify: bool) {
+        self.certify = certify;
     }
 
     /// Sends a visitor to the store of a kind.
@@ -145,6 +159,21 @@ impl Stores {
             }
             *surface = surface.with(Mask8::from_bits(same), &found);
         }
+    }
+
+    /// Where a ray first meets a side of a row that is seen, in f64.
+    pub fn decide(&self, row: RowRef, ray: &Ray64) -> Option<f64> {
+        row.kind().and_then(|kind| self.visit(kind, Decide { row: row.row(), ray, all: false }))
+    }
+
+    /// The same of any side.
+    pub fn decide_any(&self, row: RowRef, ray: &Ray64) -> Option<f64> {
+        row.kind().and_then(|kind| self.visit(kind, Decide { row: row.row(), ray, all: true }))
+    }
+
+    /// What f64 may be off by where a ray meets a row at `t`.
+    pub fn noise(&self, row: RowRef, ray: &Ray64, t: f64) -> f64 {
+        row.kind().map_or(0.0, |kind| self.visit(kind, Noise { row: row.row(), ray, t }))
     }
 
     /// What a ray meets on a row near `t`, in f64.
@@ -251,6 +280,34 @@ impl<const NORMAL: bool> Visit for SurfaceOf<'_, NORMAL> {
         };
         let surface = if NORMAL { Surface8 { normal: surface.normal, ..Surface8::NOTHING } } else { surface };
         (surface, owners)
+    }
+}
+
+struct Decide<'a> {
+    row: usize,
+    ray: &'a Ray64,
+    /// Hidden sides too.
+    all: bool,
+}
+
+impl Visit for Decide<'_> {
+    type Output = Option<f64>;
+    fn visit<P: Part>(self, store: &Store<P>) -> Option<f64> {
+        let visible = if self.all { Visible::Both } else { store.sides().row(self.row) };
+        store.part(self.row).and_then(|part| part.decide(self.ray, visible))
+    }
+}
+
+struct Noise<'a> {
+    row: usize,
+    ray: &'a Ray64,
+    t: f64,
+}
+
+impl Visit for Noise<'_> {
+    type Output = f64;
+    fn visit<P: Part>(self, store: &Store<P>) -> f64 {
+        store.part(self.row).map_or(0.0, |part| noise(part, self.ray, self.t))
     }
 }
 

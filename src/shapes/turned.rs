@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::cuboid::{face, face_uv, face64, first_of, slabs, slabs64};
+use super::cuboid::{Stretch, face, face_uv, face64, slabs64};
 use super::{Hidden8, Part, Ray64, Surface8, Surface64, nearer, roundings};
 use crate::lanes::{Float8, Hit8, RayPacket, Vec3x8};
 use crate::plan::{Owner, TurnedBoxPart};
@@ -13,6 +13,7 @@ use crate::scene::Visible;
 pub struct Anchor {
     min: Vec3x8, // corners relative to the origin, in the frame of the box
     max: Vec3x8,
+    error: Vec3x8, // of both
     axes: [Vec3x8; 3],
 }
 
@@ -29,14 +30,21 @@ impl Part for TurnedBoxPart {
     #[inline(always)]
     fn anchor<'a>(rows: &Self::Rows, origin: &Vec3x8, _: impl Fn(usize) -> Option<&'a Self>) -> Anchor {
         let ([center, half], axes) = *rows;
-        let f = local(&axes, center - *origin);
-        Anchor { min: f - half, max: f + half, axes }
+        let from = center - *origin;
+        let f = local(&axes, from);
+        // The center rounds with the scene, the difference once, its turning five times; then it is added and divided.
+        let moved = roundings(2.5) * center.abs().sum() + roundings(7.0) * from.abs().sum();
+        let error = (f.abs() + half) * roundings(6.0) + Vec3x8::new(moved, moved, moved);
+        Anchor { min: f - half, max: f + half, error, axes }
     }
 
     #[inline(always)]
-    fn hit<const CULL: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
-        let (entry, exit) = slabs(anchor.min, anchor.max, local(&anchor.axes, rays.dir));
-        first_of::<CULL>(entry, exit, hidden, rays)
+    fn hit<const CULL: bool, const CERTIFY: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
+        let Anchor { min, max, error, axes } = anchor;
+        // Turning rounds each coordinate by a share of the whole direction.
+        let turned = roundings(6.0) * rays.dir.abs().sum();
+        let dir = local(axes, rays.dir);
+        Stretch::new::<CERTIFY>(*min, *max, *error, dir, turned).first_of::<CULL, CERTIFY>(hidden, rays)
     }
 
     fn decide(&self, ray: &Ray64, visible: Visible) -> Option<f64> {
