@@ -203,9 +203,16 @@ impl<'s> Tracer<'s> {
 
     /// The place of a hit again, in f64: what is left is its rounding.
     fn place(&self, row: RowRef, ray: &Ray64, t: f32) -> f32 {
-        let stores = self.tree.stores();
-        let again = || stores.refine(row, ray, f64::from(t)).map(|surface| surface.t);
-        stores.decide(row, ray).or_else(again).map_or(t, |t| t as f32)
+        let again = || self.tree.stores().refine(row, ray, f64::from(t)).map(|surface| surface.t);
+        self.tree.stores().decide(row, ray).or_else(again).map_or(t, |t| t as f32)
+    }
+
+    /// Point and normal again in f64, where a scene is so small or so large that f32 holds no squares of it.
+    #[cold]
+    fn again(&self, row: RowRef, ray: &Ray64, t: f32) -> ([f32; 3], [f32; 3]) {
+        let surface = self.tree.stores().refine(row, ray, f64::from(t));
+        let narrow = |v: DVec3| v.as_vec3().to_array();
+        surface.map_or(([0.0; 3], [0.0; 3]), |surface| (narrow(surface.point), narrow(surface.normal)))
     }
 
     fn eight_hits(&self, rays: &RayPacket, found: &Found8) -> [Option<Hit>; LANES] {
@@ -217,13 +224,17 @@ impl<'s> Tracer<'s> {
         std::array::from_fn(|i| {
             let row = RowRef::from_lane(rows.as_array()[i]);
             row.kind()?;
-            let (owner, point, normal) = (owners[i], points[i], normals[i]);
+            let (owner, mut point, mut normal) = (owners[i], points[i], normals[i]);
+            let ray = Ray64::exact(&rays.lane(i));
+            let t = self.place(row, &ray, t[i]);
+            if !normal.iter().chain(&point).all(|x| x.is_finite()) {
+                (point, normal) = self.again(row, &ray, t);
+            }
             let front = normal[0] * dirs[i][0] + normal[1] * dirs[i][1] + normal[2] * dirs[i][2] < 0.0;
             let material = self.plan.side_material(owner.material, front);
             let uv = attributes::uv(&self.plan, stores, row, owner, DVec3::from_array(point.map(f64::from)));
             let error = errors[i] + 2.0 * UNIT_ROUNDOFF * point.iter().map(|x| x.abs()).sum::<f32>();
             let uv = uv.as_vec2().to_array();
-            let t = self.place(row, &Ray64::exact(&rays.lane(i)), t[i]);
             Some(Hit { t, primitive: primitives[i], material, normal, uv, front, point, error })
         })
     }

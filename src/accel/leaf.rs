@@ -167,7 +167,7 @@ impl<const ANY: bool, const CULL: bool> Visit for LineLeaf<'_, ANY, CULL> {
 impl<const ANY: bool, const CULL: bool> LineLeaf<'_, ANY, CULL> {
     #[inline(always)]
     fn each_ray<P: Part, const CERTIFY: bool>(self, store: &Store<P>) {
-        let Leaf { kind, block, .. } = self.leaf;
+        let Leaf { kind, block, count } = self.leaf;
         let row = |lane: usize| block * LANES + lane;
         let rows = store.block(block);
         let hidden = if CULL { store.sides().lanes(row) } else { Hidden8::NONE };
@@ -176,14 +176,17 @@ impl<const ANY: bool, const CULL: bool> LineLeaf<'_, ANY, CULL> {
             let ray = line.splat();
             let anchor = P::anchor(rows, &ray.origin, |lane| store.part(row(lane)));
             let hit = P::hit::<CULL, CERTIFY>(&anchor, &ray, &hidden);
-            let lanes = (hit.mask | hit.doubt).bits();
+            let lanes = (hit.mask | hit.doubt).bits() & ((1 << count) - 1);
             if lanes == 0 {
                 continue;
             }
             let sure = hit.mask & !hit.doubt;
-            if ANY && (sure & Mask8::le(hit.t + hit.error, ray.t_max)).any() {
-                line.end(RowRef::new(kind, row(lanes.trailing_zeros() as usize)));
-                continue;
+            if ANY {
+                let met = (sure & Mask8::le(hit.t + hit.error, ray.t_max)).bits() & lanes;
+                if met != 0 {
+                    line.end(RowRef::new(kind, row(met.trailing_zeros() as usize)));
+                    continue;
+                }
             }
             let (mask, sure) = (hit.mask.bits(), sure.bits());
             let (t, error, mut best) = (hit.t.as_array(), hit.error.as_array(), line.best());

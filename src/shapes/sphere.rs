@@ -69,7 +69,8 @@ impl Part for SpherePart {
             let dd = rays.dir.dot(rays.dir);
             slack = near.select(difference_of_products(fd, fd, dd, c) * rays.inv_dd, slack);
         }
-        let possible = Mask8::ge(slack, -bound);
+        // Where squares overflow there is no slack, and all is open.
+        let possible = if CERTIFY { !Mask8::lt(slack, -bound) } else { Mask8::ge(slack, Float8::ZERO) };
         if !possible.any() {
             return Hit8::none();
         }
@@ -105,11 +106,11 @@ impl Part for SpherePart {
             return Hit8 { t, error, mask, doubt: Mask8::NONE };
         }
         let mut doubt = entry_open | (exit_ok & !entry_ok & exit_open);
-        let silhouette = possible & Mask8::le(slack, bound);
+        let silhouette = possible & !Mask8::gt(slack, bound);
         if silhouette.any() {
             // No root lies further from p.
             let half = ((slack.abs() + bound) * rays.inv_dd).sqrt() + edge;
-            let near_ray = Mask8::gt(p + half, rays.t_min) & Mask8::le(p - half, rays.t_max);
+            let near_ray = !Mask8::le(p + half, rays.t_min) & !Mask8::gt(p - half, rays.t_max) & rays.live();
             doubt = (doubt & !silhouette) | (silhouette & near_ray);
         }
         Hit8 { t, error, mask: mask & !doubt & !silhouette, doubt }
