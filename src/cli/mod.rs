@@ -42,6 +42,7 @@ mod scene_file;
 mod settings;
 mod signals;
 mod stats_json;
+mod stress;
 mod system;
 
 use std::path::Path;
@@ -95,6 +96,8 @@ enum Command {
     Info(info::Args),
     /// Check the engine against the f64 reference on a scene
     Check(check::Args),
+    /// Run what f32 is bad at, family by family, against exact geometry
+    Stress(stress::Args),
     /// Measure how far apart two pictures are
     Compare(compare::Args),
     /// Trace the rays of a file and write what they meet
@@ -219,6 +222,7 @@ pub fn run() -> ExitCode {
         Command::Batch(args) => batch::run(args, &run),
         Command::Info(args) => info::run(args, &run),
         Command::Check(args) => check::run(args, &run),
+        Command::Stress(args) => stress::run(args, &run),
         Command::Compare(args) => compare::run(args, &run),
         Command::Query(args) => query::run(args, &run),
         Command::Bench(args) => bench::run(args, &run),

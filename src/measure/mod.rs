@@ -12,6 +12,7 @@ pub mod metrics;
 pub mod pareto;
 pub mod plot;
 mod ssim;
+pub mod stress;
 
 pub use self::heatmap::heatmap;
 pub use self::metrics::{CompareError, Comparison, compare};

@@ -167,6 +167,14 @@ impl Reference {
         ties.copied().min_by_key(|(primitive, _)| *primitive).unwrap_or(first)
     }
 
+    /// The error of `t` that f32 cannot avoid at the place of a primitive on the ray that is nearest to `t`.
+    pub fn unit(&self, ray: &Ray, primitive: usize, t: f64) -> Option<f64> {
+        let line = Line::new(ray, true)?;
+        let places = self.placed.get(primitive)?.body.roots(&line).into_iter().flatten();
+        let off = |root: &Root| (root.t - t / line.scale).abs();
+        places.min_by(|a, b| off(a).total_cmp(&off(b))).map(|root| root.unit * line.scale)
+    }
+
     /// The difference of a `t` from the nearest place of one primitive on the ray, in units of that
     /// place; `None` where the primitive is not even nearly met.
     pub fn units(&self, ray: &Ray, primitive: usize, t: f32) -> Option<f64> {

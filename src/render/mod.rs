@@ -383,7 +383,8 @@ impl<'s> Frame<'s> {
         plan.leave_out_layers(renderer.layers);
         let parts = plan.parts();
         let plan_seconds = start.elapsed().as_secs_f64();
-        let tree = Tree::new(parts, &plan.visible).certify(renderer.certify).one_by_one(renderer.engine == Engine::Single);
+        let tree =
+            Tree::new(parts, &plan.visible).certify(renderer.certify).one_by_one(renderer.engine == Engine::Single);
         let build_seconds = start.elapsed().as_secs_f64() - plan_seconds;
         let image = &renderer.image;
         let display = (image.width, image.height);
