@@ -152,17 +152,17 @@ fn coincident_surfaces_go_to_the_lowest_index_from_everywhere() {
 #[test]
 fn camera_rays_see_what_those_in_f64_see() {
     let mut dice = Dice(11);
-    let mut shapes: Vec<Shape> = (0..60).map(|_| sphere(dice.in_cube(0.3), dice.log_between(1e-3, 0.02))).collect();
+    let mut shapes: Vec<Shape> = (0..60).map(|_| sphere(dice.in_cube(0.04), dice.log_between(1e-4, 3e-3))).collect();
     shapes.extend((0..30).map(|_| {
-        let (c, half) = (dice.in_cube(0.3), DVec3::splat(0.002) + dice.in_cube(0.02).abs());
+        let (c, half) = (dice.in_cube(0.04), DVec3::splat(3e-4) + dice.in_cube(2e-3).abs());
         cuboid(c - half, c + half)
     }));
     for (_, maker) in MAKERS.iter().filter(|(name, _)| *name != "plane") {
-        shapes.extend((0..4).map(|_| maker(dice.in_cube(0.3), dice.between(0.002, 0.02), turn(&mut dice))));
+        shapes.extend((0..4).map(|_| maker(dice.in_cube(0.04), dice.between(3e-4, 3e-3), turn(&mut dice))));
     }
     let mut scene = scene_of(shapes);
     scene.image = image(320, 240, 1);
-    scene.cameras = vec![pinhole(DVec3::new(130.1, 40.2, 200.3), DVec3::ZERO, 0.16)];
+    scene.cameras = vec![pinhole(DVec3::new(130.1, 40.2, 200.3), DVec3::ZERO, 0.02)];
     let report = |scene: &Scene, certify, spp| {
         let settings = CheckSettings { certify, spp, seconds: 8.0, ..CheckSettings::default() };
         check(scene, &settings).expect("a report")
@@ -171,7 +171,7 @@ fn camera_rays_see_what_those_in_f64_see() {
     assert_eq!((on.rays.camera.different, on.rays.camera.ties), (0, 0), "{on}");
     assert!(on.rays.camera.replayed > 5_000 && on.rays.camera.redecided > 0, "{on}");
     assert!(off.rays.camera.different > 0, "{off}");
-    scene.cameras = vec![common::orthographic(DVec3::new(130.1, 40.2, 200.3), DVec3::ZERO, 0.7)];
+    scene.cameras = vec![common::orthographic(DVec3::new(130.1, 40.2, 200.3), DVec3::ZERO, 0.09)];
     let on = report(&scene, true, 2);
     assert_eq!((on.rays.camera.different, on.rays.camera.ties), (0, 0), "{on}");
 }

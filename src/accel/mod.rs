@@ -77,6 +77,7 @@ impl Counts {
             boxes: self.boxes - before.boxes,
             kinds: std::array::from_fn(|kind| self.kinds[kind] - before.kinds[kind]),
             redecided: self.redecided - before.redecided,
+            ties: self.ties - before.ties,
         }
     }
 

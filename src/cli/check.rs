@@ -2,11 +2,14 @@
 
 use std::path::PathBuf;
 
-use octray::measure::check::{CheckSettings, check};
+use octray::measure::check::{CheckSettings, check_layers};
+use octray::measure::heatmap;
+use octray::output::{self, Format, png};
 
 use super::Run;
 use super::args::{self, Threads};
 use super::exit::{Exit, Failure};
+use super::pictures;
 use super::scene_file::{self, Moment};
 
 const EXAMPLES: &str = "\
@@ -40,6 +43,12 @@ pub struct Args {
     /// Seed of the choice of pixels
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
+    /// Write the differences as layers: radiance, both pictures, depth (and in ulps), normal angle, wrong object
+    #[arg(long, value_name = "FILE.exr")]
+    layers: Option<PathBuf>,
+    /// Write a picture of the differences, with a scale
+    #[arg(long, value_name = "FILE.png")]
+    heatmap: Option<PathBuf>,
     /// Check an engine that lets f32 alone decide: to see what certainty is good for
     #[arg(long)]
     no_certify: bool,
@@ -54,6 +63,13 @@ pub struct Args {
 
 pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
     run.warn_of_build();
+    for (path, format, ending) in [(&args.layers, Format::Exr, ".exr"), (&args.heatmap, Format::Png, ".png")] {
+        let Some(path) = path else { continue };
+        if Format::of(path) != Some(format) {
+            return Err(Failure::new(Exit::Usage, format!("{}: this should end in {ending}", path.display())));
+        }
+        run.check_output(path, &[&args.scene])?;
+    }
     let mut scene = args.moment.load(&args.scene, args.resolution, run)?.scene;
     scene_file::resize(&mut scene, args.resolution);
     scene_file::need_memory(&scene, 0, "the check of this scene")?;
@@ -64,9 +80,23 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
         seconds: args.seconds,
         seed: args.seed,
         certify: !args.no_certify,
+        layers: args.layers.is_some() || args.heatmap.is_some(),
         ..CheckSettings::default()
     };
-    let report = pool.install(|| check(&scene, &settings))?;
+    let (report, layers) = pool.install(|| check_layers(&scene, &settings))?;
+    if let Some(path) = &args.layers {
+        let options = output::Options {
+            exr: output::Storage { float: true, ..output::Storage::default() },
+            ..output::Options::default()
+        };
+        output::write(path, &layers.differences, options, &output::Description::default())?;
+    }
+    if let Some(path) = &args.heatmap {
+        let title = format!("engine - reference, {}", args.scene.display());
+        let bytes = png::encode_raster(&heatmap(&layers.engine, &layers.reference)?, &title);
+        let bytes = bytes.map_err(|error| Failure::new(Exit::Output, error).of(path))?;
+        pictures::write_bytes(path, &bytes, run)?;
+    }
     if args.json {
         let json = serde_json::to_value(&report).map_err(|error| Failure::new(Exit::Limit, error))?;
         run.console.print_json(&json)?;

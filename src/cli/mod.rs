@@ -24,6 +24,7 @@ mod console;
 mod convert;
 pub mod cpu;
 mod exit;
+mod explain;
 mod extras;
 mod gate;
 mod hits;
@@ -96,6 +97,8 @@ enum Command {
     Info(info::Args),
     /// Check the engine against the f64 reference on a scene
     Check(check::Args),
+    /// Print the tree of rays of one sample of a pixel
+    Explain(explain::Args),
     /// Run what f32 is bad at, family by family, against exact geometry
     Stress(stress::Args),
     /// Measure how far apart two pictures are
@@ -222,6 +225,7 @@ pub fn run() -> ExitCode {
         Command::Batch(args) => batch::run(args, &run),
         Command::Info(args) => info::run(args, &run),
         Command::Check(args) => check::run(args, &run),
+        Command::Explain(args) => explain::run(args, &run),
         Command::Stress(args) => stress::run(args, &run),
         Command::Compare(args) => compare::run(args, &run),
         Command::Query(args) => query::run(args, &run),

@@ -14,6 +14,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::layers::{self, Eyes, LayerReport, Layers, PixelDifference};
 use crate::film::Window;
 use crate::integrate::{RayCounts, RayKind, Record};
 use crate::lanes::Ray;
@@ -21,6 +22,7 @@ use crate::reference::{self, Event, EventKind, Reference, Verdict, View};
 use crate::render::{Frame, RenderError, Renderer};
 use crate::sample;
 use crate::scene::Scene;
+use crate::tracer::Tracer;
 
 /// Bound on the relative RMSE of pixels whose rays agree, where nothing mirrors or refracts.
 pub const MAX_REL_RMSE: f64 = 1e-5;
@@ -44,13 +46,15 @@ pub struct CheckSettings {
     pub seed: u64,
     /// Differences to list, at most.
     pub listed: usize,
+    /// Whether to keep what makes up [`Layers`].
+    pub layers: bool,
     /// Whether the engine decides in f64 what f32 leaves open, as it should; for measuring what that is good for.
     pub certify: bool,
 }
 
 impl Default for CheckSettings {
     fn default() -> Self {
-        CheckSettings { spp: 1, seconds: 60.0, seed: 0, listed: 10, certify: true }
+        CheckSettings { spp: 1, seconds: 60.0, seed: 0, listed: 10, layers: false, certify: true }
     }
 }
 
@@ -71,6 +75,8 @@ pub struct Report {
     pub differences: Vec<Difference>,
     /// Ties, the first few.
     pub ties: Vec<Difference>,
+    /// Percentiles of the layers, where they were asked for.
+    pub layers: Option<LayerReport>,
     /// Wall time.
     pub seconds: f64,
 }
@@ -137,25 +143,42 @@ pub struct Difference {
 }
 
 /// Checks a scene.
+///
+/// # Errors
+/// As [`Renderer::new`].
 pub fn check(scene: &Scene, settings: &CheckSettings) -> Result<Report, RenderError> {
+    check_layers(scene, settings).map(|(report, _)| report)
+}
+
+/// Checks a scene and keeps the pictures; without `settings.layers` they are empty.
+///
+/// # Errors
+/// As [`check`].
+pub fn check_layers(scene: &Scene, settings: &CheckSettings) -> Result<(Report, Layers), RenderError> {
     let start = Instant::now();
     let renderer = Renderer::new(scene)?.spp(settings.spp).skip(false).certify(settings.certify);
     let frame = Frame::prepare(&renderer);
     let reference = Reference::relative_to(scene, frame.origin());
     let image = renderer.image();
     let view = reference.view(renderer.view(), image, &scene.render);
-    let judge = Judge { frame: &frame, reference: &reference, view: &view };
+    let tracer = Tracer::relative_to(scene, frame.origin())?;
+    let eyes = settings.layers.then_some(Eyes { tracer: &tracer, reference: &reference });
+    let judge = Judge { frame: &frame, reference: &reference, view: &view, eyes };
     let window = Window::full((image.width, image.height));
     let pixels = judge.choose(window, settings);
     let tallies = pixels.par_iter().map(|(block, pixels)| judge.block(*block, pixels, settings.listed));
     let tally = tallies.reduce(Tally::default, |a, b| a.with(b, settings.listed));
-    Ok(tally.report(window.area() as u64, frame.scatters(), start.elapsed()))
+    let pictures = layers::pictures(&tally.seen, (image.width, image.height));
+    let report = tally.report(window.area() as u64, frame.scatters(), settings.layers, start.elapsed());
+    Ok((report, pictures))
 }
 
 struct Judge<'a, 's> {
     frame: &'a Frame<'s>,
     reference: &'a Reference,
     view: &'a View,
+    /// Where layers are wanted.
+    eyes: Option<Eyes<'a, 's>>,
 }
 
 /// Pixels to look at, by block.
@@ -256,6 +279,11 @@ impl Judge<'_, '_> {
         let mut theirs: Vec<Event> = want.events.into_iter().filter(says_something).collect();
         mine.sort_unstable();
         theirs.sort_unstable();
+        if let Some(eyes) = &self.eyes {
+            let first = |note: &&Note| note.event.sample == 0 && note.event.kind == EventKind::Camera;
+            let cast = notes.iter().find(first).and_then(|note| note.cast.as_ref());
+            tally.seen.push(eyes.see((x, y), (got, want.rgba), cast, &self.view.sample(x, y, 0)));
+        }
         let color = |rgba: [f64; 4]| DVec3::new(rgba[0], rgba[1], rgba[2]);
         let (got, want) = (color(got.map(f64::from)), color(want.rgba));
         let difference = got - want;
@@ -275,7 +303,7 @@ fn says_something(event: &Event) -> bool {
     !(matches!(event.kind, EventKind::Light(_)) && event.outcome == 0)
 }
 
-fn exact(ray: &Ray) -> reference::Ray {
+pub(super) fn exact(ray: &Ray) -> reference::Ray {
     let wide = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
     let (t_min, t_max) = (f64::from(ray.t_min), f64::from(ray.t_max));
     reference::Ray { origin: wide(ray.origin), dir: wide(ray.dir), t_min, t_max }
@@ -286,32 +314,48 @@ fn difference(cast: &Cast, at: (i32, i32, u32), expected: Option<usize>, expecte
     Difference { kind, at, bits, got, expected, t, expected_t }
 }
 
-fn bits(ray: &Ray) -> [u32; 8] {
+/// The difference of a `t` from the exact one, in ulps of f32.
+pub(super) fn ulps(t: f32, exact: f64) -> f64 {
+    let near = (exact as f32).abs();
+    (f64::from(t) - exact) / (f64::from(near.next_up()) - f64::from(near))
+}
+
+pub(super) fn bits(ray: &Ray) -> [u32; 8] {
     let ([x, y, z], [a, b, c]) = (ray.origin, ray.dir);
     [x, y, z, ray.t_min, a, b, c, ray.t_max].map(f32::to_bits)
 }
 
 /// What the engine did for some pixels.
-struct Tape {
+pub(super) struct Tape {
     wanted: HashMap<(i32, i32), Vec<Note>>,
     /// By slot of the tile in hand.
     slots: Vec<(i32, i32, u32)>,
 }
 
 /// One decision of the engine, and the ray behind it.
-struct Note {
-    event: Event,
-    cast: Option<Cast>,
+pub(super) struct Note {
+    pub event: Event,
+    pub cast: Option<Cast>,
 }
 
-struct Cast {
-    kind: RayKind,
-    ray: Ray,
-    met: Option<u32>,
-    t: f32,
+pub(super) struct Cast {
+    pub kind: RayKind,
+    pub ray: Ray,
+    pub met: Option<u32>,
+    pub t: f32,
 }
 
 impl Tape {
+    /// For what is done for some pixels.
+    pub fn of(pixels: impl IntoIterator<Item = (i32, i32)>) -> Self {
+        Tape { wanted: pixels.into_iter().map(|pixel| (pixel, Vec::new())).collect(), slots: Default::default() }
+    }
+
+    /// What was done for one of them.
+    pub fn take(&mut self, pixel: (i32, i32)) -> Vec<Note> {
+        self.wanted.remove(&pixel).unwrap_or_default()
+    }
+
     fn note(&mut self, slot: usize, path: u32, kind: EventKind, outcome: i64, cast: Option<Cast>) {
         let Some(&(x, y, sample)) = self.slots.get(slot) else { return };
         if let Some(notes) = self.wanted.get_mut(&(x, y)) {
@@ -364,6 +408,7 @@ struct Tally {
     sums: DVec3,
     differences: Vec<Difference>,
     ties: Vec<Difference>,
+    seen: Vec<PixelDifference>,
 }
 
 impl RayReports {
@@ -401,10 +446,11 @@ impl Tally {
         self.differences.truncate(listed);
         self.ties.append(&mut other.ties);
         self.ties.truncate(listed);
+        self.seen.append(&mut other.seen);
         self
     }
 
-    fn report(mut self, of: u64, scatters: bool, time: Duration) -> Report {
+    fn report(mut self, of: u64, scatters: bool, layers: bool, time: Duration) -> Report {
         for kind in RayKind::ALL {
             self.rays.of(kind).redecided = self.counts.redecided[kind as usize];
         }
@@ -423,8 +469,9 @@ impl Tally {
         };
         let failures = failures(&self.rays, &picture);
         let (rays, differences, ties) = (self.rays, self.differences, self.ties);
+        let layers = layers.then(|| layers::figures(&self.seen));
         let (pass, seconds) = (failures.is_empty(), time.as_secs_f64());
-        Report { schema: 1, pass, failures, rays, picture, differences, ties, seconds }
+        Report { schema: 1, pass, failures, rays, picture, differences, ties, layers, seconds }
     }
 }
 
@@ -467,6 +514,9 @@ impl std::fmt::Display for Report {
         writeln!(f, "  relative RMSE of the others {:.2e}", picture.rel_rmse)?;
         writeln!(f, "  relative difference of the means {:.2e}", picture.mean_difference)?;
         writeln!(f, "  pixels off by more than {VISIBLE:.0e}: {}", picture.visible)?;
+        if let Some(layers) = &self.layers {
+            writeln!(f, "{layers}")?;
+        }
         for difference in &self.differences {
             let Difference { kind, at, bits, got, expected, t, expected_t } = difference;
             writeln!(

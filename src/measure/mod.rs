@@ -6,8 +6,10 @@
 pub mod bench;
 mod canvas;
 pub mod check;
+pub mod explain;
 pub mod gate;
 pub mod heatmap;
+pub mod layers;
 pub mod metrics;
 pub mod pareto;
 pub mod plot;

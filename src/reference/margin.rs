@@ -68,6 +68,21 @@ impl Placed {
     }
 }
 
+/// A place on a ray where a primitive is met, or nearly.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// Index of the primitive.
+    pub primitive: usize,
+    /// In lengths of the ray's direction.
+    pub t: f64,
+    /// Whether it is met, in f64.
+    pub hit: bool,
+    /// The error of `t` that f32 cannot avoid.
+    pub unit: f64,
+    /// How far the decision hit or miss is from turning, in its own f32 errors; negative for a miss.
+    pub margin: f64,
+}
+
 /// A place on a line, by primitive.
 pub(super) type Found = (usize, Root);
 
@@ -165,6 +180,35 @@ impl Reference {
         let slack = noise(&first);
         let ties = near.iter().filter(|other| other.1.t - first.1.t <= slack + noise(other));
         ties.copied().min_by_key(|(primitive, _)| *primitive).unwrap_or(first)
+    }
+
+    /// All places on a ray where something is met or nearly met, nearest first.
+    pub fn places(&self, ray: &Ray) -> Vec<Place> {
+        let Some(line) = Line::new(ray, true) else { return Vec::new() };
+        let of = |(primitive, placed): (usize, &Placed)| {
+            let roots = placed.body.roots(&line).into_iter().flatten().filter(|root| root.possible(&line));
+            let place = |root: Root| Place {
+                primitive,
+                t: root.t * line.scale,
+                hit: root.hit && line.holds(root.t),
+                unit: root.unit * line.scale,
+                margin: root.margin,
+            };
+            roots.map(place).collect::<Vec<_>>()
+        };
+        let mut places: Vec<Place> = self.placed.iter().enumerate().flat_map(of).collect();
+        places.sort_by(|a, b| a.t.total_cmp(&b.t));
+        places
+    }
+
+    /// How far the decision that a ray meets a primitive near `t` is from turning, in the errors that f32 cannot avoid:
+    /// hit or miss, and beyond the start or not. Below [`TOLERANCE`] no f32 kernel could tell.
+    pub fn margin(&self, ray: &Ray, primitive: usize, t: f64) -> Option<f64> {
+        let line = Line::new(ray, true)?;
+        let places = self.placed.get(primitive)?.body.roots(&line).into_iter().flatten();
+        let off = |root: &Root| (root.t - t / line.scale).abs();
+        let nearest = places.min_by(|a, b| off(a).total_cmp(&off(b)))?;
+        Some(nearest.margin.min(ratio(nearest.t - line.t_min, nearest.unit)))
     }
 
     /// The error of `t` that f32 cannot avoid at the place of a primitive on the ray that is nearest to `t`.

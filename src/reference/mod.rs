@@ -47,7 +47,7 @@ use crate::scene::{Background, Light, Material, Scene, Texture, Visible};
 
 pub use self::camera::View;
 pub use self::integrator::{CameraSample, Event, EventKind, First, Pixel, RayCounts};
-pub use self::margin::{TOLERANCE, U, U64, Verdict};
+pub use self::margin::{Place, TOLERANCE, U, U64, Verdict};
 
 /// Places closer than this share of their `t` may be such as f64 cannot tell apart.
 const CLOSE: f64 = 1e-5;
