@@ -23,7 +23,7 @@ impl Visit for Packet<'_> {
         let rays = self.0;
         let hit = |row: usize| {
             let anchor = P::anchor(&store.splat(row), &rays.origin, |_| store.part(row));
-            let hit = P::hit::<false>(&anchor, rays, &Hidden8::NONE);
+            let hit = P::hit::<false, true>(&anchor, rays, &Hidden8::NONE);
             assert!(!hit.doubt.any());
             hit.mask.bits().count_ones()
         };
@@ -40,7 +40,7 @@ impl Visit for Block<'_> {
     fn visit<P: Part>(self, store: &Store<P>) -> u32 {
         let hit = |ray: &RayPacket| {
             let anchor = P::anchor(store.block(0), &ray.origin, |lane| store.part(lane));
-            let hit = P::hit::<false>(&anchor, ray, &Hidden8::NONE);
+            let hit = P::hit::<false, true>(&anchor, ray, &Hidden8::NONE);
             assert!(!hit.doubt.any());
             hit.mask.bits().count_ones()
         };

@@ -95,8 +95,8 @@ impl Visit for Brute<'_> {
             let mut rays = *rays;
             for row in (0..store.blocks() * LANES).filter(|row| store.part(*row).is_some()) {
                 let anchor = P::anchor(&store.splat(row), &rays.origin, |_| store.part(row));
-                let hit = P::hit::<false>(&anchor, &rays, &Hidden8::NONE);
-                rays.t_max = hit.mask.select(hit.t, rays.t_max);
+                let hit = P::hit::<false, true>(&anchor, &rays, &Hidden8::NONE);
+                rays.t_max = hit.mask.select(hit.t.fast_min(rays.t_max), rays.t_max);
             }
             (*at, rays.t_max)
         });
