@@ -61,10 +61,10 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
         let failure = Failure::new(Exit::Input, &error);
         error.part().map_or(failure.message.clone(), |part| failure.of(&args.parts[part]).message)
     });
-    let whole = joined.map_err(|message| Failure::new(Exit::Input, message))?;
+    let mut whole = joined.map_err(|message| Failure::new(Exit::Input, message))?;
     drop(pictures);
     // As a render of the whole frame does: with a background there is nothing to trim.
-    // whole.trim();
+    whole.trim();
     let scene = kept.as_ref().and_then(|kept| kept.text("render/scene"));
     let description = Description { scene, kept, ..Description::default() };
     pictures::write(&whole, &target, options, &description, run)?;

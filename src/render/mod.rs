@@ -301,7 +301,8 @@ impl<'s> Renderer<'s> {
 
     /// A hash of the scene and of all settings that decide about colour: equal hashes, equal pixels. In hexadecimal.
     pub fn scene_hash(&self) -> String {
-        let settings = (self.image(), self.view(), self.depth(), self.pattern(), self.engine == Engine::Reference);
+        let is_reference = self.engine == Engine::Reference;
+        let settings = (self.image(), self.view(), self.integrator, self.depth(), self.pattern(), is_reference);
         self.scene.hash(&format!("{settings:?}"))
     }
 

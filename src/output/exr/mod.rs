@@ -9,10 +9,11 @@ mod header;
 mod layout;
 mod manifest;
 mod sort;
+mod zip;
 
 use std::io::Cursor;
 
-use exr::block::chunk::Chunk;
+use exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock};
 use exr::block::writer::ChunksWriter;
 use exr::block::{BlockIndex, UncompressedBlock};
 use exr::meta::MetaData;
@@ -26,6 +27,7 @@ pub use self::manifest::Beside;
 pub(super) use self::manifest::is_about as is_about_mattes;
 
 use self::layout::Part;
+use self::zip::Packer;
 use super::color::{self, Primaries};
 use super::pixel_hash::{Digests, PixelHash};
 use super::{Description, EncodeError, Losses};
@@ -180,12 +182,12 @@ fn pack(picture: &Picture, parts: &[Part<'_>], headers: &[Header]) -> Result<Vec
         headers: headers.iter().cloned().collect(),
     };
     let blocks: Vec<(usize, BlockIndex)> = meta.enumerate_ordered_header_block_indices().collect();
-    let one = |(index, block): (usize, BlockIndex)| {
+    let one = |packer: &mut Packer, (index, block): (usize, BlockIndex)| {
         let (part, header) = (&parts[block.layer], &headers[block.layer]);
         let block = UncompressedBlock { index: block, data: rows(picture, part, header, block) };
         let exact = !header.compression.may_loose_data();
         let mut digests = if exact { digest(part, header, &block) } else { Vec::new() };
-        let chunk = block.compress_to_chunk(headers).map_err(EncodeError::new)?;
+        let chunk = chunk(block, headers, packer)?;
         if !exact {
             // The hash is of what a reader finds.
             let back = UncompressedBlock::decompress_chunk(chunk.clone(), &meta, true).map_err(EncodeError::new)?;
@@ -193,7 +195,22 @@ fn pack(picture: &Picture, parts: &[Part<'_>], headers: &[Header]) -> Result<Vec
         }
         Ok(Packed { index, chunk, digests })
     };
-    blocks.into_par_iter().map(one).collect()
+    blocks.into_par_iter().map_init(Packer::new, one).collect()
+}
+
+/// A block as it is stored.
+fn chunk(block: UncompressedBlock, headers: &[Header], packer: &mut Packer) -> Result<Chunk, EncodeError> {
+    use exr::prelude::Compression::{ZIP1, ZIP16};
+    let (layer_index, header) = (block.index.layer, &headers[block.index.layer]);
+    if cfg!(target_endian = "big") || !matches!(header.compression, ZIP1 | ZIP16) {
+        return block.compress_to_chunk(headers).map_err(EncodeError::new);
+    }
+    let y = i32::try_from(block.index.pixel_position.y()).map_err(EncodeError::new)?;
+    let lines = CompressedScanLineBlock {
+        y_coordinate: header.own_attributes.layer_position.y() + y,
+        compressed_pixels_le: packer.pack(block.data),
+    };
+    Ok(Chunk { layer_index, compressed_block: CompressedBlock::ScanLine(lines) })
 }
 
 /// The rows of a block, as they are before compression.

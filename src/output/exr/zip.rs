@@ -1,0 +1,78 @@
+//! Chunks packed by zlib, as ZIPS and ZIP have them.
+//!
+//! The crate can do it too, at zlib's level 4 with a state of its own for each chunk. Level 1 with one state a thread
+//! takes a third of the time for files that are 7 % longer (1920x1080, 7 channels of halves and 9 of floats:
+//! 0.37 instead of 1.21 s of one core).
+//! Source: OpenEXR, `internal_zip.c`: bytes at even places, then those at odd ones; each as its difference from the one
+//! before it, plus 128; then zlib; and as they were where that is no shorter.
+
+use flate2::{Compress, Compression, FlushCompress, Status};
+
+/// What a thread keeps from chunk to chunk.
+pub(super) struct Packer {
+    zlib: Compress,
+    sorted: Vec<u8>,
+}
+
+impl Packer {
+    pub fn new() -> Self {
+        Packer { zlib: Compress::new(Compression::fast(), true), sorted: Vec::new() }
+    }
+
+    /// The bytes of a chunk, little-endian, as the file holds them.
+    pub fn pack(&mut self, bytes: Vec<u8>) -> Vec<u8> {
+        sort(&bytes, &mut self.sorted);
+        self.zlib.reset();
+        // No more than this is of use.
+        let mut packed = Vec::with_capacity(bytes.len());
+        let ended = self.zlib.compress_vec(&self.sorted, &mut packed, FlushCompress::Finish);
+        match ended {
+            Ok(Status::StreamEnd) if packed.len() < bytes.len() => packed,
+            _ => bytes,
+        }
+    }
+}
+
+/// Both steps before zlib.
+fn sort(bytes: &[u8], sorted: &mut Vec<u8>) {
+    sorted.clear();
+    sorted.resize(bytes.len(), 0);
+    let (even, odd) = sorted.split_at_mut(bytes.len().div_ceil(2));
+    even.iter_mut().zip(bytes.iter().step_by(2)).for_each(|(place, byte)| *place = *byte);
+    odd.iter_mut().zip(bytes.iter().skip(1).step_by(2)).for_each(|(place, byte)| *place = *byte);
+    let mut before = sorted.first().copied().unwrap_or_default();
+    for place in sorted.iter_mut().skip(1) {
+        let byte = std::mem::replace(place, place.wrapping_sub(before).wrapping_add(128));
+        before = byte;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_are_sorted_as_the_format_says() {
+        let mut sorted = Vec::new();
+        sort(&[10, 1, 12, 2, 9], &mut sorted);
+        // 10 12 9 | 1 2 and their differences.
+        assert_eq!(sorted, [10, 130, 125, 120, 129]);
+        sort(&[], &mut sorted);
+        assert!(sorted.is_empty());
+    }
+
+    #[test]
+    fn what_does_not_shrink_stays_as_it_is() {
+        let mut packer = Packer::new();
+        let mut seed = 1u32;
+        let noise = std::iter::repeat_with(|| {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (seed >> 24) as u8
+        });
+        let noise: Vec<u8> = noise.take(4000).collect();
+        assert_eq!(packer.pack(noise.clone()), noise);
+        let flat = packer.pack(vec![7; 4000]);
+        assert!(flat.len() < 60 && packer.pack(vec![7; 4000]) == flat, "a state is as good as new: {}", flat.len());
+        assert_eq!(packer.pack(vec![1, 2, 3]), [1, 2, 3]);
+    }
+}
