@@ -24,8 +24,35 @@ pub struct WindowChoice {
     pub crop: Option<Window>,
     /// The same by shares of width and height: x0, y0, x1, y1.
     pub crop_ndc: Option<[f64; 4]>,
+    /// One of equal parts of the picture.
+    pub tile: Option<Tile>,
     /// Some beyond each side.
     pub overscan: Option<Overscan>,
+}
+
+/// One part of a picture that is cut into columns and rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Tile {
+    /// How many columns there are.
+    pub columns: u32,
+    /// How many rows there are.
+    pub rows: u32,
+    /// Which part it is, from 1, row by row.
+    pub index: u32,
+}
+
+impl Tile {
+    /// Its pixels; none where there are more columns or rows than pixels.
+    pub fn window(self, (width, height): (u32, u32)) -> Window {
+        let (column, row) = ((self.index - 1) % self.columns, (self.index - 1) / self.columns);
+        let edge = |size: u32, part: u32, of: u32| (u64::from(size) * u64::from(part) / u64::from(of)) as i32;
+        Window {
+            x0: edge(width, column, self.columns),
+            y0: edge(height, row, self.rows),
+            x1: edge(width, column + 1, self.columns),
+            y1: edge(height, row + 1, self.rows),
+        }
+    }
 }
 
 /// What is added on each side.
@@ -63,13 +90,14 @@ impl LayerChoice {
 impl WindowChoice {
     /// Whether some part of the picture was chosen.
     pub fn is_crop(&self) -> bool {
-        self.crop.is_some() || self.crop_ndc.is_some()
+        self.crop.is_some() || self.crop_ndc.is_some() || self.tile.is_some()
     }
 
     /// The pixels of a picture of a size.
     pub fn window(&self, display: (u32, u32)) -> Window {
         let overscan = self.overscan.map_or([0; 2], |overscan| overscan.pixels(display));
         let crop = self.crop.or_else(|| self.crop_ndc.map(|corners| of_shares(corners, display)));
+        let crop = crop.or_else(|| self.tile.map(|tile| tile.window(display)));
         crop.unwrap_or_else(|| Window::full(display).grown(overscan))
     }
 
@@ -108,6 +136,16 @@ fn of_shares([x0, y0, x1, y1]: [f64; 4], (width, height): (u32, u32)) -> Window 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn tiles_cover_a_picture_once() {
+        let mut seen = vec![0; 101 * 37];
+        for index in 1..=12 {
+            let Window { x0, y0, x1, y1 } = Tile { columns: 4, rows: 3, index }.window((101, 37));
+            (y0..y1).for_each(|y| (x0..x1).for_each(|x| seen[(y * 101 + x) as usize] += 1));
+        }
+        assert!(seen.iter().all(|count| *count == 1));
+    }
 
     #[test]
     fn shares_of_a_picture_are_whole_pixels() {

@@ -8,6 +8,8 @@
 //! (small ones one a core, large ones by all cores), encoded on the core that finished it, and written by a thread of
 //! its own, which makes files durable in groups.
 
+mod annotate;
+mod checkpoint;
 mod choice;
 pub mod existing;
 pub mod frames;
@@ -22,7 +24,8 @@ mod source;
 mod watch;
 mod write;
 
-pub use self::choice::{LayerChoice, Overscan, WindowChoice};
+pub use self::checkpoint::Checkpoint;
+pub use self::choice::{LayerChoice, Overscan, Tile, WindowChoice};
 pub use self::job::{Job, Settings, Shard, View, stem};
 pub use self::run::{Options, Summary, run};
 pub use self::source::Sources;

@@ -6,7 +6,7 @@
 //! While a large picture is traced by all, nobody opens another one; while one is read or built, others are.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
@@ -14,13 +14,14 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
+use super::checkpoint::{Checkpoint, Partial};
 use super::memory::{self, forecast};
 use super::source::Ticket;
 use super::write::{Finished, Room, Writer, line};
-use super::{Event, Job, JobError, Report, Shard, Sources, Watch, existing, ledger};
+use super::{Event, Job, JobError, Report, Shard, Sources, Watch, annotate, existing, ledger};
 use crate::output::exr::Encoded;
 use crate::output::{self, Format, OutputError, aside};
-use crate::render::{RenderError, Renderer, Rendering, Task, pool};
+use crate::render::{RenderError, Renderer, Rendering, Task, Traced, pool};
 use crate::scene::inputs::{Hashes, hex, sha256};
 use crate::scene::{Aov, Scene};
 
@@ -43,6 +44,10 @@ pub struct Options {
     pub ledger: bool,
     /// Most memory for scenes, trees and pictures, in bytes, as forecast.
     pub max_memory: Option<u64>,
+    /// Write what is seen where beside each picture: its name with `.json`.
+    pub annotations: bool,
+    /// Keep what is done of a single picture in a file, and go on from there.
+    pub checkpoint: Option<Checkpoint>,
     /// Which part of the list this is, for the files.
     pub shard: Option<Shard>,
 }
@@ -61,6 +66,9 @@ pub struct Summary {
     /// Whether it was asked to stop.
     pub cancelled: bool,
 }
+
+/// A picture, what its file says of it, and what is seen where, if that is asked for.
+type Pictured = (Rendering, output::Description, Option<(PathBuf, Vec<u8>)>);
 
 /// A batch on its way.
 struct Batch<'a> {
@@ -221,7 +229,7 @@ impl Batch<'_> {
         if is_new {
             scene.warnings.iter().for_each(|warning| self.warn(index, warning.to_string()));
         }
-        let Some((mut rendering, description)) = self.picture(index, &scene)? else {
+        let Some((mut rendering, description, annotations)) = self.picture(index, &scene)? else {
             self.skip(index);
             return Ok(());
         };
@@ -246,7 +254,8 @@ impl Batch<'_> {
             bytes: bytes.len() as u64,
             hash,
         };
-        let beside = beside.into_iter().map(|file| (job.output.with_file_name(&file.name), file.bytes)).collect();
+        let beside = beside.into_iter().map(|file| (job.output.with_file_name(&file.name), file.bytes));
+        let beside = annotations.into_iter().chain(beside).collect();
         writer.write(Finished { job: index, path: job.output.clone(), beside, bytes, report });
         Ok(())
     }
@@ -264,7 +273,7 @@ impl Batch<'_> {
     }
 
     /// Traces a picture with the help of whoever has nothing else to do; `None` where the file is there already.
-    fn picture(&self, index: usize, scene: &Scene) -> Result<Option<(Rendering, output::Description)>, JobError> {
+    fn picture(&self, index: usize, scene: &Scene) -> Result<Option<Pictured>, JobError> {
         let job = &self.jobs[index];
         let failed = |error| match error {
             RenderError::Cancelled => JobError::Cancelled,
@@ -274,6 +283,10 @@ impl Batch<'_> {
         let mut renderer = job.renderer(scene).map_err(failed)?;
         if let Some(next) = &next {
             renderer = renderer.next_frame(next);
+        }
+        let wanted = job.settings.layers.layers(scene).unwrap_or(scene.layers);
+        if self.options.annotations {
+            renderer = renderer.layers(wanted.with(Aov::Ids));
         }
         let scene_hash = renderer.scene_hash();
         if self.options.resume && existing::is_current(job, &renderer, &scene_hash) {
@@ -285,6 +298,11 @@ impl Batch<'_> {
         self.large.fetch_add(total, Ordering::Relaxed);
         let waiting = AtomicU64::new(total);
         let stopped = || self.stopped();
+        let partial = self.resumed(job, &scene_hash, &task)?;
+        let of = |task: &Task| {
+            (0..task.blocks()).filter(|block| partial.as_ref().is_none_or(|kept| !lock(kept).has(*block)))
+        };
+        let blocks: Vec<usize> = of(&task).collect();
         let trace = |block| {
             let samples = task.samples(block);
             self.large.fetch_sub(samples, Ordering::Relaxed);
@@ -295,14 +313,62 @@ impl Batch<'_> {
             let traced = task.trace(block, &stopped)?;
             self.watch.event(&Event::Block(index, job, &renderer, &task, &traced));
             self.advance(samples as f64 / total as f64, index);
-            Some(traced)
+            match &partial {
+                None => Some(Some(traced)),
+                Some(kept) => {
+                    self.keep(kept, block, traced, &task, index);
+                    Some(None)
+                }
+            }
         };
-        let traced: Option<Vec<_>> = (0..task.blocks()).into_par_iter().map(trace).collect();
-        self.large.fetch_sub(waiting.into_inner(), Ordering::Relaxed);
-        let rendering = task.finish(traced.ok_or(JobError::Cancelled)?, self.threads, start);
+        let traced: Option<Vec<_>> = blocks.into_par_iter().map(trace).collect();
+        self.large.fetch_sub(waiting.load(Ordering::Relaxed), Ordering::Relaxed);
+        let mut rendering = match (partial, traced) {
+            (None, traced) => {
+                let traced = traced.ok_or(JobError::Cancelled)?.into_iter().flatten().collect();
+                task.finish(traced, self.threads, start)
+            }
+            (Some(kept), Some(_)) => {
+                kept.into_inner().unwrap_or_else(PoisonError::into_inner).finish(&task, self.threads)
+            }
+            (Some(kept), None) => {
+                if let Some(checkpoint) = &self.options.checkpoint {
+                    lock(&kept).write(&checkpoint.path, &task)?;
+                }
+                return Err(JobError::Cancelled);
+            }
+        };
+        let annotations = self.options.annotations.then(|| {
+            let page = annotate::page(job, &renderer, scene, &rendering.picture, &rendering.names);
+            (job.output.with_extension("json"), page.into_bytes())
+        });
+        if !wanted.has(Aov::Ids) {
+            rendering.picture.channels.retain(|channel| channel.layer() != "id");
+        }
         let shard = self.options.shard.map(|shard| shard.to_string());
         let description = job.description(&renderer, &rendering.stats, Some(scene_hash), shard);
-        Ok(Some((rendering, description)))
+        Ok(Some((rendering, description, annotations)))
+    }
+
+    /// What a checkpoint has of a picture already; `None` where there is to be none.
+    fn resumed(&self, job: &Job, scene_hash: &str, task: &Task) -> Result<Option<Mutex<Partial>>, JobError> {
+        let Some(Checkpoint { path, .. }) = &self.options.checkpoint else { return Ok(None) };
+        let key = format!("{scene_hash} {}", ledger::settings_hash(job));
+        let partial = Partial::open(path, key, task);
+        let partial = partial.map_err(|reason| JobError::Checkpoint { path: path.clone(), reason })?;
+        Ok(Some(Mutex::new(partial)))
+    }
+
+    /// Takes a block into the checkpoint, and writes it where it is time.
+    fn keep(&self, kept: &Mutex<Partial>, block: usize, traced: Traced, task: &Task, index: usize) {
+        let Some(Checkpoint { path, every }) = &self.options.checkpoint else { return };
+        let mut kept = lock(kept);
+        kept.add(block, traced);
+        if kept.is_due(*every)
+            && let Err(error) = kept.write(path, task)
+        {
+            self.warn(index, error.to_string());
+        }
     }
 
     /// The scene that motion leads to, where that is asked for.
@@ -353,6 +419,10 @@ impl Batch<'_> {
         let job = &self.jobs[index];
         match result {
             Ok(report) => {
+                // A picture that is there has no need of its checkpoint.
+                if let Some(checkpoint) = &self.options.checkpoint {
+                    let _ = std::fs::remove_file(&checkpoint.path);
+                }
                 if let Some(ledgers) = &self.ledgers {
                     let hash = self.files_hash(job).unwrap_or_default();
                     if let Err(error) = ledgers.add(job, &hash, &report) {

@@ -97,6 +97,14 @@ pub enum JobError {
         /// What does not fit.
         error: EncodeError,
     },
+    /// The checkpoint cannot be gone on from.
+    #[error("{}: {reason}", path.display())]
+    Checkpoint {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// The file cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),

@@ -84,7 +84,7 @@ impl Inbox<'_> {
             while let Some(finished) = next {
                 let (job, start) = (finished.job, Instant::now());
                 match self.put(finished, stop) {
-                    Ok((aside, report)) => group.push(job, aside, report, start),
+                    Ok((files, report)) => group.push(job, files, report, start),
                     Err(error) => told(job, Err(error)),
                 }
                 next = if group.jobs.len() < GROUP && !self.durable { self.receiver.try_recv().ok() } else { None };
@@ -94,21 +94,21 @@ impl Inbox<'_> {
     }
 
     /// Writes aside what a job came to.
-    fn put(&self, finished: Finished, stop: &dyn Fn() -> bool) -> Result<(Option<Aside>, Report), OutputError> {
+    fn put(&self, finished: Finished, stop: &dyn Fn() -> bool) -> Result<(Vec<Aside>, Report), OutputError> {
         let Finished { path, beside, bytes, report, .. } = finished;
+        let picture = (path, bytes);
+        let (path, bytes) = &picture;
         let written = (|| {
-            for (path, bytes) in &beside {
-                crate::output::aside::write(path, bytes)?;
-            }
             if path.as_os_str() == "-" {
-                return stream(&bytes).map(|()| None);
+                return stream(bytes).map(|()| Vec::new());
             }
-            Aside::write(&path, &bytes, || !stop()).map(Some)
+            let all = beside.iter().chain(std::iter::once(&picture));
+            all.map(|(path, bytes)| Aside::write(path, bytes, || !stop())).collect()
         })();
         let mut waiting = self.room.bytes.lock().unwrap_or_else(PoisonError::into_inner);
         *waiting = waiting.saturating_sub(bytes.len() as u64);
         self.room.freed.notify_all();
-        written.map(|aside| (aside, report))
+        written.map(|files| (files, report))
     }
 }
 
@@ -122,29 +122,30 @@ fn stream(bytes: &[u8]) -> Result<(), OutputError> {
 #[derive(Default)]
 struct Group {
     jobs: Vec<(usize, Report, Instant)>,
+    /// Of each job in turn: those beside the picture first.
     files: Vec<Aside>,
-    /// Jobs that went to a stream.
-    streamed: Vec<(usize, Report)>,
+    /// How many each job has; a stream has none.
+    counts: Vec<usize>,
 }
 
 impl Group {
-    fn push(&mut self, job: usize, aside: Option<Aside>, report: Report, start: Instant) {
-        match aside {
-            Some(aside) => {
-                self.files.push(aside);
-                self.jobs.push((job, report, start));
-            }
-            None => self.streamed.push((job, report)),
-        }
+    fn push(&mut self, job: usize, files: Vec<Aside>, report: Report, start: Instant) {
+        self.counts.push(files.len());
+        self.files.extend(files);
+        self.jobs.push((job, report, start));
     }
 
     /// Flushes all, then gives them their names.
     fn end(self, told: &mut dyn FnMut(usize, Result<Report, OutputError>)) {
-        self.streamed.into_iter().for_each(|(job, report)| told(job, Ok(report)));
-        let (flushed, count) = (Aside::flush_all(&self.files), self.files.len() as f64);
-        for ((file, flushed), (job, mut report, start)) in self.files.into_iter().zip(flushed).zip(self.jobs) {
-            report.write_seconds += start.elapsed().as_secs_f64() / count;
-            told(job, flushed.and_then(|()| file.take_name()).map(|()| report));
+        let flushed = Aside::flush_all(&self.files);
+        let share = 1.0 / self.jobs.len().max(1) as f64;
+        let mut files = self.files.into_iter().zip(flushed);
+        for ((job, mut report, start), count) in self.jobs.into_iter().zip(self.counts) {
+            // All are taken off the list, those behind one that failed as well: they are removed.
+            let own: Vec<_> = files.by_ref().take(count).collect();
+            let named = own.into_iter().try_for_each(|(file, flushed)| flushed.and_then(|()| file.take_name()));
+            report.write_seconds += share * start.elapsed().as_secs_f64();
+            told(job, named.map(|()| report));
         }
     }
 }

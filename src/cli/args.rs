@@ -77,6 +77,13 @@ pub fn resolution(text: &str) -> Result<(u32, u32), String> {
     Ok((width, height))
 }
 
+/// `4x2`: columns and rows.
+pub fn tiles(text: &str) -> Result<(u32, u32), String> {
+    let side = |text: &str| text.parse::<u32>().ok().filter(|side| (1..=1000).contains(side));
+    let sides = text.split_once(['x', 'X']).and_then(|(columns, rows)| Some((side(columns)?, side(rows)?)));
+    sides.ok_or_else(|| "should be COLUMNSxROWS, each from 1 to 1000, such as 4x2".to_owned())
+}
+
 /// `X0,Y0,X1,Y1`, half open.
 pub fn crop(text: &str) -> Result<Window, String> {
     let numbers: Option<Vec<i32>> = text.split(',').map(|number| number.trim().parse().ok()).collect();

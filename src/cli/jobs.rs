@@ -2,9 +2,10 @@
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use clap::Args;
-use octray::batch::{self, Job, JobError, Shard, Sources, Summary};
+use octray::batch::{self, Checkpoint, Job, JobError, Shard, Sources, Summary};
 use octray::output::{Format, OutputError};
 
 use super::Run;
@@ -32,6 +33,15 @@ pub struct Running {
     /// Most memory for scenes, trees and pictures, as forecast from the files: 4G, 500M
     #[arg(long, value_name = "SIZE", value_parser = bytes)]
     max_memory: Option<u64>,
+    /// Write what is seen where beside each picture, as JSON after the manner of COCO: its name with .json
+    #[arg(long)]
+    annotations: bool,
+    /// Keep what is done of a single long picture in a file; the same command goes on from there, to the same bits
+    #[arg(long, value_name = "FILE")]
+    checkpoint: Option<PathBuf>,
+    /// Time between two writes of --checkpoint: 60s, 10m, 1h
+    #[arg(long, value_name = "TIME", value_parser = duration, default_value = "60s", requires = "checkpoint")]
+    checkpoint_every: Duration,
     /// Lines about progress on standard output, for machines
     #[arg(long, value_enum, value_name = "FORM")]
     progress: Option<Lines>,
@@ -49,6 +59,20 @@ fn shard(text: &str) -> Result<Shard, String> {
         Some((index, of)) if (1..=of).contains(&index) => Ok(Shard { index, of }),
         _ => Err("should be I/N with I from 1 to N, such as 2/8".to_owned()),
     }
+}
+
+/// `60s`, `10m`, `1h`, `2.5`.
+fn duration(text: &str) -> Result<Duration, String> {
+    let at = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
+    let factor = match &text[at..] {
+        "" | "s" => Some(1.0),
+        "m" | "min" => Some(60.0),
+        "h" => Some(3600.0),
+        _ => None,
+    };
+    let seconds = factor.and_then(|factor| Some(factor * text[..at].parse::<f64>().ok()?));
+    let seconds = seconds.filter(|seconds| (0.0..1e9).contains(seconds));
+    seconds.map(Duration::from_secs_f64).ok_or_else(|| "should be a time such as 60s, 10m or 1h".to_owned())
 }
 
 /// `4G`, `500M`, `1048576`.
@@ -94,6 +118,15 @@ pub fn run(list: List, running: &Running, sources: &Sources, run: &Run) -> Resul
         let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
         run.check_output(stats, &inputs)?;
     }
+    let every = running.checkpoint_every;
+    let checkpoint = running.checkpoint.clone().map(|path| Checkpoint { path, every });
+    if let Some(Checkpoint { path, .. }) = &checkpoint {
+        if many {
+            return Err(Failure::new(Exit::Usage, "--checkpoint is about one picture; a batch goes on with --resume"));
+        }
+        let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
+        run.check_output(path, &inputs)?;
+    }
     let options = batch::Options {
         threads: running.threads.count(),
         durable: running.durable,
@@ -101,6 +134,8 @@ pub fn run(list: List, running: &Running, sources: &Sources, run: &Run) -> Resul
         ledger,
         max_memory: running.max_memory,
         shard: running.shard,
+        annotations: running.annotations,
+        checkpoint,
     };
     let preview = (!many).then(|| Preview::new(run, running.tev.as_deref()));
     let mut teller = Teller::new(run, running.progress, preview, jobs.len(), running.stats.stats.is_some());
@@ -216,6 +251,7 @@ fn exit(error: &JobError) -> Exit {
     match error {
         JobError::Scene { .. } => Exit::Input,
         JobError::Render { error, .. } => Failure::from(error.clone()).exit,
+        JobError::Checkpoint { .. } => Exit::Input,
         JobError::Encode { .. } | JobError::Output(_) => Exit::Output,
         JobError::Memory(_) | JobError::Cancelled => Exit::Limit,
         JobError::Mistake { .. } => Exit::No,

@@ -1,7 +1,7 @@
 //! Layers beside the colour, and windows, as options.
 
 use clap::{Args, ValueEnum};
-use octray::batch::{LayerChoice, Overscan, WindowChoice};
+use octray::batch::{LayerChoice, Overscan, Tile, WindowChoice};
 use octray::film::Window;
 use octray::scene::Layers;
 
@@ -44,6 +44,12 @@ pub struct Windows {
     /// The same by shares of width and height: 0,0,0.5,1 is the left half
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = ndc, allow_hyphen_values = true, conflicts_with = "crop")]
     crop_ndc: Option<[f64; 4]>,
+    /// Cut the picture into so many columns and rows, and render one of the parts
+    #[arg(long, value_name = "CxR", value_parser = args::tiles, requires = "tile", conflicts_with_all = ["crop", "crop_ndc", "overscan"])]
+    tiles: Option<(u32, u32)>,
+    /// Which of --tiles: from 1, row by row
+    #[arg(long, value_name = "K", requires = "tiles", value_parser = clap::value_parser!(u32).range(1..))]
+    tile: Option<u32>,
     /// Render so many pixels, or percents of width and height, beyond each side as well
     #[arg(long, value_name = "N|N%", value_parser = overscan)]
     overscan: Option<Overscan>,
@@ -71,8 +77,16 @@ impl LayerArgs {
 
 impl Windows {
     /// As the library takes them.
-    pub fn choice(&self) -> WindowChoice {
-        WindowChoice { crop: self.crop, crop_ndc: self.crop_ndc, overscan: self.overscan }
+    ///
+    /// # Errors
+    /// A tile that there is not.
+    pub fn choice(&self) -> Result<WindowChoice, Failure> {
+        let tile = self.tiles.zip(self.tile).map(|((columns, rows), index)| Tile { columns, rows, index });
+        if let Some(Tile { columns, rows, index }) = tile.filter(|tile| tile.index > tile.columns * tile.rows) {
+            let text = format!("--tile {index} is none of the {} tiles of {columns}x{rows}", columns * rows);
+            return Err(Failure::new(Exit::Usage, text));
+        }
+        Ok(WindowChoice { crop: self.crop, crop_ndc: self.crop_ndc, tile, overscan: self.overscan })
     }
 }
 

@@ -6,7 +6,7 @@
 //!
 //! | file | what it is about |
 //! |---|---|
-//! | `render`, `batch`, `info`, `check`, `compare`, `query`, `convert`, `merge`, `manual` | one command each (`manual`: two) |
+//! | `render`, `batch`, `info`, `check`, `compare`, `query`, `convert`, `merge`, `status`, `farm`, `manual` | one command each (`manual`: two) |
 //! | `args`, `atoms`, `settings` | words that several commands understand |
 //! | `jobs` | running what `render` and `batch` put on a list |
 //! | `bench`, `gate`, `pareto` | measuring |
@@ -26,6 +26,7 @@ pub mod cpu;
 mod exit;
 mod explain;
 mod extras;
+mod farm;
 mod gate;
 mod hits;
 mod info;
@@ -43,6 +44,7 @@ mod scene_file;
 mod settings;
 mod signals;
 mod stats_json;
+mod status;
 mod stress;
 mod system;
 
@@ -113,6 +115,10 @@ enum Command {
     Convert(convert::Args),
     /// Join crops of one frame to the frame
     Merge(merge::Args),
+    /// Say what a batch has done, by the record in its directory
+    Status(status::Args),
+    /// Write scripts that render on many machines
+    Farm(farm::Args),
     /// Print the completions of a shell
     Completions(manual::CompletionArgs),
     /// Print the manual page, or write the pages of all commands
@@ -233,6 +239,8 @@ pub fn run() -> ExitCode {
         Command::Pareto(args) => pareto::run(args, &run),
         Command::Convert(args) => convert::run(args, &run),
         Command::Merge(args) => merge::run(args, &run),
+        Command::Status(args) => status::run(args, &run),
+        Command::Farm(args) => farm::run(args, &run),
         Command::Completions(args) => manual::completions(args, &run),
         Command::Man(args) => manual::man(args, &run),
     };

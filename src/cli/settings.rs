@@ -89,7 +89,7 @@ impl Settings {
     pub fn job(&self, scene: PathBuf) -> Result<Job, Failure> {
         let settings = octray::batch::Settings {
             resolution: self.resolution,
-            windows: self.windows.choice(),
+            windows: self.windows.choice()?,
             layers: self.layers.choice()?,
             transparent: self.background.is_some(),
             spp: self.spp,

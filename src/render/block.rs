@@ -63,7 +63,15 @@ impl Block {
 
     /// All samples of all pixels: pixels along a Z curve, the samples of one after another, 64 at a time.
     /// So a tile is as square as the number of samples allows, and each pixel sums in sample order.
-    pub fn trace<R: Record>(&self, rays: &CameraRays, direct: &Direct, spp: u32, record: &mut R) -> BlockWork {
+    /// `None` where `stop` asked for that within.
+    pub fn trace<R: Record>(
+        &self,
+        rays: &CameraRays,
+        direct: &Direct,
+        spp: u32,
+        record: &mut R,
+        stop: impl Fn() -> bool,
+    ) -> Option<BlockWork> {
         let window = self.window;
         let sums = vec![[0f64; 4]; window.area()];
         let before = (Counts::default(), RayCounts::default());
@@ -73,6 +81,9 @@ impl Block {
         for code in 0..(EDGE * EDGE) as u32 {
             let (x, y) = (window.x0 + compact(code), window.y0 + compact(code >> 1));
             let Some(index) = window.index(x, y) else { continue };
+            if code % 32 == 0 && stop() {
+                return None;
+            }
             let pattern = rays.pattern(x, y);
             let mut sample = 0;
             while sample < spp {
@@ -88,7 +99,7 @@ impl Block {
         let pixels = work.sums.into_iter().map(|sum| sum.map(|x| (x * share) as f32)).collect();
         let (tiles, background_tiles) = (work.tiles, work.background_tiles);
         let Room { walk, rays, left_out, .. } = work.room;
-        BlockWork { pixels, layers: None, rays, tests: walk.counts, left_out, tiles, background_tiles }
+        Some(BlockWork { pixels, layers: None, rays, tests: walk.counts, left_out, tiles, background_tiles })
     }
 
     /// The part of a block's pixels and layers that lies in this one.

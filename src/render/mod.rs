@@ -411,8 +411,8 @@ impl<'s> Frame<'s> {
 
     /// Traces one block on this thread, as a render does, while a record looks on: its pixels row by row.
     pub fn trace_block<R: Record>(&self, block: Window, record: &mut R) -> (Vec<[f32; 4]>, RayCounts) {
-        let work = Block::new(block).trace(&self.rays, &self.direct(), self.spp, record);
-        (work.pixels, work.rays)
+        let work = Block::new(block).trace(&self.rays, &self.direct(), self.spp, record, || false);
+        work.map_or_else(Default::default, |work| (work.pixels, work.rays))
     }
 
     fn direct(&self) -> Direct<'_> {

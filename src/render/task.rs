@@ -93,7 +93,7 @@ impl<'s> Task<'s> {
         let part = match &self.work {
             Work::Blocks(frame, blocks) => {
                 let block = blocks[block];
-                Part::Block(block, self.trace_block(frame, &block))
+                Part::Block(block, self.trace_block(frame, &block, stop)?)
             }
             Work::Rows(rows) => Part::Row(rows.trace(block, self.layers.as_ref(), stop)?),
         };
@@ -108,19 +108,19 @@ impl<'s> Task<'s> {
         }
     }
 
-    fn trace_block(&self, frame: &Frame, block: &Block) -> BlockWork {
+    fn trace_block(&self, frame: &Frame, block: &Block, stop: &(dyn Fn() -> bool + Sync)) -> Option<BlockWork> {
         let Some(plan) = &self.layers else {
-            return block.trace(&frame.rays, &frame.direct(), self.spp, &mut Silent);
+            return block.trace(&frame.rays, &frame.direct(), self.spp, &mut Silent, stop);
         };
         // What a pixel costs depends on those that are traced with it: they must not depend on a crop.
         let whole = if plan.layers.has(Aov::Cost) { block.whole() } else { *block };
         let mut tape = LayerTape::new(frame, plan, whole.window.area());
-        let mut work = whole.trace(&frame.rays, &frame.direct(), self.spp, &mut tape);
+        let mut work = whole.trace(&frame.rays, &frame.direct(), self.spp, &mut tape, stop)?;
         work.layers = Some(tape.finish(whole.window));
         if whole.window != block.window {
             block.cut(&whole, &mut work);
         }
-        work
+        Some(work)
     }
 
     /// The picture of all blocks, whatever their order; `threads` and `start` (of tracing) are for its statistics.

@@ -78,7 +78,7 @@ fn tight(balls: &[(DVec3, f64)], center: DVec3, axes: (DVec3, DVec3, DVec3), tan
 }
 
 /// Balls that hold a shape; planes have none.
-fn bound(shape: &Shape, balls: &mut Vec<(DVec3, f64)>) {
+pub fn bound(shape: &Shape, balls: &mut Vec<(DVec3, f64)>) {
     match shape {
         Shape::Sphere(sphere) => balls.push((sphere.center, sphere.radius)),
         Shape::Plane(_) => {}

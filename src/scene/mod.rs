@@ -42,6 +42,7 @@ pub use self::background::{Backdrop, Background};
 pub use self::camera::{Camera, Lens};
 pub use self::cloud::{Cloud, CloudMaterial, CloudShapes, Rows};
 pub use self::error::{Place, SceneError, SceneErrors, Warning};
+pub(crate) use self::fit::bound as bounding_balls;
 pub use self::frames::Frames;
 pub use self::image::{Filter, FilterKind, FilterTable, ImageSettings, Integrator, RenderSettings};
 pub use self::layers::{Aov, Layers, UnknownAov};
