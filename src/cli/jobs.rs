@@ -14,7 +14,7 @@ use super::exit::{Exit, Failure};
 use super::pictures::Target;
 use super::preview::Preview;
 use super::progress::{Lines, Teller};
-use super::{scene_file, stats_json};
+use super::{again, scene_file, sheet, stats_json};
 
 /// How jobs are run.
 #[derive(Debug, Clone, Args)]
@@ -36,6 +36,12 @@ pub struct Running {
     /// Write what is seen where beside each picture, as JSON after the manner of COCO: its name with .json
     #[arg(long)]
     annotations: bool,
+    /// Draw all pictures in rows, each with its number in the list, to look at
+    #[arg(long, value_name = "FILE.png")]
+    contact_sheet: Option<PathBuf>,
+    /// Render so many percent of the pictures again, those that were there as well, and compare
+    #[arg(long, value_name = "PERCENT", value_parser = percent)]
+    verify: Option<f64>,
     /// Keep what is done of a single long picture in a file; the same command goes on from there, to the same bits
     #[arg(long, value_name = "FILE")]
     checkpoint: Option<PathBuf>,
@@ -59,6 +65,12 @@ fn shard(text: &str) -> Result<Shard, String> {
         Some((index, of)) if (1..=of).contains(&index) => Ok(Shard { index, of }),
         _ => Err("should be I/N with I from 1 to N, such as 2/8".to_owned()),
     }
+}
+
+/// Above 0, up to 100.
+fn percent(text: &str) -> Result<f64, String> {
+    let number = text.trim_end_matches('%').parse().ok().filter(|percent| *percent > 0.0 && *percent <= 100.0);
+    number.ok_or_else(|| "should be a number above 0, up to 100".to_owned())
 }
 
 /// `60s`, `10m`, `1h`, `2.5`.
@@ -127,6 +139,13 @@ pub fn run(list: List, running: &Running, sources: &Sources, run: &Run) -> Resul
         let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
         run.check_output(path, &inputs)?;
     }
+    if let Some(sheet) = &running.contact_sheet {
+        if sheet.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("png")) {
+            return Err(Failure::new(Exit::Usage, "--contact-sheet should end in .png").of(sheet));
+        }
+        let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
+        run.check_output(sheet, &inputs)?;
+    }
     let options = batch::Options {
         threads: running.threads.count(),
         durable: running.durable,
@@ -143,6 +162,12 @@ pub fn run(list: List, running: &Running, sources: &Sources, run: &Run) -> Resul
     teller.end(&summary);
     if summary.cancelled {
         run.signals.end();
+    }
+    if let Some(path) = &running.contact_sheet {
+        sheet::write(&jobs, path, run)?;
+    }
+    if let Some(percent) = running.verify {
+        again::verify(&jobs, percent, &options, run)?;
     }
     if let Some(path) = &running.stats.stats {
         let frames = teller.reports();

@@ -14,6 +14,7 @@
 //! | `console`, `progress`, `stats_json` | what is said, to people and machines |
 //! | `cpu`, `system`, `signals`, `exit` | the world around the process |
 
+mod again;
 mod args;
 mod atoms;
 mod batch;
@@ -42,6 +43,7 @@ mod query;
 mod render;
 mod scene_file;
 mod settings;
+mod sheet;
 mod signals;
 mod stats_json;
 mod status;
