@@ -5,7 +5,7 @@
 use exr::math::Vec2;
 use exr::meta::BlockDescription;
 use exr::meta::attribute::{AttributeValue, Chromaticities, IntegerBounds, Text};
-use exr::meta::header::{Header, ImageAttributes, LayerAttributes};
+use exr::meta::header::{Header, ImageAttributes, LayerAttributes, standard_names};
 use exr::prelude::LineOrder;
 
 use super::layout::Part;
@@ -94,6 +94,7 @@ fn image_attributes(
     let kept = description.kept.as_ref().map(|kept| kept.shared.clone());
     let mut attributes = kept.unwrap_or_else(|| ImageAttributes::new(frame));
     attributes.display_window = frame;
+    attributes.other.retain(|name, _| is_sound(name.as_slice()));
     attributes.chromaticities = Some(chromaticities(storage.primaries()));
     Ok(attributes)
 }
@@ -128,10 +129,16 @@ fn layer_attributes(picture: &Picture, description: &Description) -> LayerAttrib
         attributes.capture_date = Some(text(&description::utc(run.date)));
         attributes.utc_offset = Some(0.0);
     }
-    // What was said of other samples is said anew.
-    attributes.other.retain(|name, _| !manifest::is_about(name.as_slice()) && name.as_slice() != PIXEL_HASH.as_bytes());
+    // What was said of other samples is said anew; a damaged file may have said what none can.
+    let is_about_samples = |name: &[u8]| manifest::is_about(name) || name == PIXEL_HASH.as_bytes();
+    attributes.other.retain(|name, _| is_sound(name.as_slice()) && !is_about_samples(name.as_slice()));
     attributes.other.extend(own_attributes(description).map(|(name, value)| (text(name), value)));
     attributes
+}
+
+/// Whether an attribute beside the standard ones can have this name.
+fn is_sound(name: &[u8]) -> bool {
+    !name.is_empty() && !name.contains(&0) && !standard_names::ALL.contains(&name)
 }
 
 /// Attributes beside the standard ones: ours, and two that other tools read (pbrt-v4, `image.cpp`).

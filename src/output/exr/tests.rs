@@ -323,3 +323,19 @@ fn names_that_clash_are_refused() {
     picture.channels[1].name = String::new();
     assert!(encode(&picture, FLOAT, &described()).is_err());
 }
+
+/// A damaged header may give a standard name to an attribute of another type: it is left out of the next file.
+#[test]
+fn attributes_that_no_file_can_have_are_not_kept() {
+    let mut kept = read_back(&layered(), FLOAT).attributes.unwrap();
+    for name in ["lineOrder", "software", ""] {
+        kept.own.other.insert(text(name), AttributeValue::I32(1));
+        kept.shared.other.insert(text(name), AttributeValue::I32(1));
+    }
+    kept.own.other.insert(text("mine"), AttributeValue::I32(1));
+    let description = Description { kept: Some(kept), ..Description::default() };
+    let bytes = encode(&layered(), FLOAT, &description).unwrap().bytes;
+    let own = header(&bytes).own_attributes.other;
+    assert_eq!(own.get(&text("mine")), Some(&AttributeValue::I32(1)));
+    assert!(!own.contains_key(&text("lineOrder")));
+}
