@@ -15,6 +15,17 @@ pub mod dimension {
     pub const FILTER: u32 = 0;
     /// The point on the lens.
     pub const LENS: u32 = 1;
+    /// The direction in which a surface scatters.
+    pub const SCATTER: u32 = 0;
+    /// First which way a path goes on, then whether it does.
+    pub const CHOICE: u32 = 1;
+    /// The place in light `i`: `LIGHTS + i`; the sky comes after the last light.
+    pub const LIGHTS: u32 = 16;
+
+    /// A use where the ray of a depth (the camera ray's is 1) has met a surface.
+    pub fn at(depth: u32, what: u32) -> u32 {
+        (depth << 20).wrapping_add(what)
+    }
 }
 
 /// Names the sample pattern of one pixel: all its samples and dimensions.

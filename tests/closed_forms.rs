@@ -69,7 +69,7 @@ fn a_plane_mirror_shows_the_mirrored_scene() {
         image_of.push(shape(flip(center)));
     }
     let light_at = DVec3::new(3.0, 7.0, 5.0);
-    let backdrop = Background { backdrop: Backdrop::Color(DVec3::new(0.1, 0.2, 0.4)), transparent: false };
+    let backdrop = Background { backdrop: Backdrop::Color(DVec3::new(0.1, 0.2, 0.4)), ..Background::default() };
     let complete = |shapes: Vec<Shape>, light: DVec3| Scene {
         lights: vec![point_light(light, 300.0)],
         cameras: vec![pinhole(DVec3::new(0.3, 0.2, 6.0), DVec3::ZERO, 40.0)],
@@ -279,7 +279,8 @@ fn a_glass_slab_shifts_what_is_behind_it() {
 fn a_transparent_background_is_clear_before_the_camera_and_there_for_mirrors() {
     let mut scene = scene_of([sphere(DVec3::ZERO, 1.0)]);
     scene.materials[0] = material("mirror", Model::Mirror { reflectance: Paint::Color(DVec3::splat(0.5)) });
-    scene.background = Background { backdrop: Backdrop::Color(DVec3::new(1.0, 2.0, 4.0)), transparent: true };
+    scene.background =
+        Background { backdrop: Backdrop::Color(DVec3::new(1.0, 2.0, 4.0)), transparent: true, light: true };
     scene.cameras = vec![pinhole(5.0 * DVec3::Z, DVec3::ZERO, 40.0)];
     scene.image = image(31, 31, 1);
     let picture = render(&scene);

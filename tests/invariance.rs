@@ -51,15 +51,17 @@ fn everything() -> Scene {
     let (position, direction) = (DVec3::new(-5.0, 9.0, 6.0), DVec3::new(0.5, -1.0, -0.5));
     let spot = Source::Spot { position, direction, intensity: DVec3::splat(300.0), cone: 40.0, penumbra: 10.0 };
     let sun = Source::Directional { direction: DVec3::new(-1.0, -2.0, -0.5), irradiance: DVec3::splat(0.5) };
+    let emitter = Emitter::Sphere { center: DVec3::new(2.0, 9.0, -3.0), radius: 1.0 };
+    let lamp = Source::Area { emitter, radiance: DVec3::splat(5.0), visible: true };
     let backdrop = Backdrop::Gradient { top: DVec3::new(0.2, 0.4, 1.0), bottom: DVec3::splat(0.1) };
     let scene = Scene {
         objects,
         materials,
         textures,
-        lights: vec![point_light(DVec3::new(3.0, 8.0, 7.0), 200.0), light(spot), light(sun)],
+        lights: vec![point_light(DVec3::new(3.0, 8.0, 7.0), 200.0), light(spot), light(sun), light(lamp)],
         cameras: vec![pinhole(DVec3::new(1.0, 2.0, 12.0), DVec3::ZERO, 45.0)],
         image: image(97, 71, 3),
-        background: Background { backdrop, transparent: false },
+        background: Background { backdrop, ..Background::default() },
         ambient: DVec3::splat(0.05),
         ..Scene::default()
     };
@@ -83,6 +85,12 @@ fn mapped(mut scene: Scene, f: impl Fn(DVec3) -> DVec3) -> Scene {
         match &mut light.source {
             Source::Point { position, .. } | Source::Spot { position, .. } => *position = f(*position),
             Source::Directional { .. } => {}
+            Source::Area { emitter: Emitter::Sphere { center, .. } | Emitter::Disk { center, .. }, .. } => {
+                *center = f(*center);
+            }
+            Source::Area { emitter: Emitter::Polygon(polygon), .. } => {
+                polygon.corners.iter_mut().for_each(|corner| *corner = f(*corner));
+            }
         }
     }
     for camera in &mut scene.cameras {
@@ -240,5 +248,5 @@ fn long_chains_of_rays_end_at_the_depth_limit() {
         [[shapes]]\ntype = \"plane\"\npoint = [0, 0, -1]\nnormal = [0, 0, 1]\nmaterial = \"mirror\"\n";
     let scene = Scene::from_toml(text, std::path::Path::new(".")).unwrap_or_else(|errors| panic!("{errors}"));
     let rendering = Renderer::new(&scene).expect("complete").render(&()).expect("a picture");
-    assert_eq!(rendering.stats.rays.rays, [256, 0, 256 * 999, 0]);
+    assert_eq!(rendering.stats.rays.rays, [256, 0, 256 * 999, 0, 0]);
 }

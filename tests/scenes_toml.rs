@@ -225,7 +225,10 @@ fn every_key_arrives() {
     assert_eq!(scene.warnings, []);
     let filter = Filter { kind: FilterKind::BlackmanHarris, radius: 2.0 };
     assert_eq!(scene.image, Some(ImageSettings { width: 64, height: 48, spp: 4, filter }));
-    assert_eq!(scene.render, RenderSettings { integrator: Integrator::Direct, max_depth: 7, seed: u64::MAX });
+    assert_eq!(
+        scene.render,
+        RenderSettings { integrator: Integrator::Direct, max_depth: 7, seed: u64::MAX, ..RenderSettings::default() }
+    );
     assert_eq!(
         scene.cameras,
         [
@@ -389,7 +392,10 @@ fn defaults_are_the_documented_ones() {
          [[shapes]]\ntype = \"plane\"\npoint = [1, 2, 3]\nnormal = [0, 0, 5]\nmaterial = \"a\"\n",
     );
     assert_eq!(scene.image, Some(ImageSettings { width: 2, height: 3, spp: 16, filter: Filter::default() }));
-    assert_eq!(scene.render, RenderSettings { integrator: Integrator::Direct, max_depth: 5, seed: 0 });
+    assert_eq!(
+        scene.render,
+        RenderSettings { integrator: Integrator::Direct, max_depth: 5, seed: 0, ..RenderSettings::default() }
+    );
     assert_eq!((scene.cameras[0].name.as_deref(), scene.cameras[0].up), (None, DVec3::Y));
     assert!(matches!(scene.background.backdrop, Backdrop::Color(DVec3::ZERO)) && !scene.background.transparent);
     let models: Vec<_> = scene.materials.iter().map(|material| material.model).collect();

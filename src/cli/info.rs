@@ -167,6 +167,7 @@ fn light((index, light): (usize, &Light)) -> Value {
         Source::Point { falloff: Falloff::None, .. } => "point without falloff",
         Source::Directional { .. } => "directional",
         Source::Spot { .. } => "spot",
+        Source::Area { ref emitter, .. } => emitter.shape().kind(),
     };
     json!({ "index": index, "name": light.name, "type": kind, "shadows": light.shadows })
 }
@@ -206,11 +207,13 @@ fn image(image: &scene::ImageSettings) -> Value {
 }
 
 fn render(scene: &Scene) -> Value {
-    let scene::RenderSettings { integrator, max_depth, seed } = scene.render;
+    let scene::RenderSettings { integrator, max_depth, seed, ao_distance } = scene.render;
     let integrator = match integrator {
         Integrator::Direct => "direct",
+        Integrator::Ao => "ao",
+        Integrator::Path => "path",
     };
-    json!({ "integrator": integrator, "max_depth": max_depth, "seed": seed })
+    json!({ "integrator": integrator, "max_depth": max_depth, "seed": seed, "ao_distance": ao_distance })
 }
 
 /// Names a page lists of each kind of thing, at most.

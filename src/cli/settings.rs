@@ -66,12 +66,18 @@ pub struct Settings {
 enum IntegratorName {
     /// Direct light with mirror reflection and refraction
     Direct,
+    /// Ambient occlusion: how open each place is, times its albedo
+    Ao,
+    /// All light, what surfaces throw on each other too
+    Path,
 }
 
 impl From<IntegratorName> for Integrator {
     fn from(name: IntegratorName) -> Integrator {
         match name {
             IntegratorName::Direct => Integrator::Direct,
+            IntegratorName::Ao => Integrator::Ao,
+            IntegratorName::Path => Integrator::Path,
         }
     }
 }

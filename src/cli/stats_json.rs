@@ -50,8 +50,7 @@ pub fn common(run: &Run, threads: usize, seconds: &Seconds) -> Map<String, Value
 /// What a render did. The reference does not tell how many shadow rays met something: null.
 pub fn add_render(stats: &mut Map<String, Value>, work: &Stats, is_reference: bool) {
     let by_kind = |counts: &[u64]| -> Map<String, Value> {
-        let kinds = RayKind::ALL.into_iter().map(|kind| (kind.name().to_owned(), json!(counts[kind as usize])));
-        kinds.chain([("bounce".to_owned(), json!(0))]).collect()
+        RayKind::ALL.into_iter().map(|kind| (kind.name().to_owned(), json!(counts[kind as usize]))).collect()
     };
     let mut hits = by_kind(&work.rays.hits);
     if is_reference {

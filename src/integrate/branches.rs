@@ -6,8 +6,8 @@ use super::wave::{Branch, Wave};
 use crate::lanes::Vec3x8;
 use crate::plan::Skip;
 
-/// Rays to be traced later: reflected, refracted.
-pub(super) type Later = [Vec<Branch>; 2];
+/// Rays to be traced later: reflected, refracted, scattered.
+pub(super) type Later = [Vec<Branch>; 3];
 
 impl Direct<'_> {
     /// Adds the rays that go on from hits.
@@ -27,7 +27,8 @@ impl Direct<'_> {
                 }
                 let origin = shaded.leave(dir.dot(facing.n_g) > 0.0, shaded.error).lane(i);
                 let path = path + list as u32;
-                later[list].push(Branch { origin, exact: (*point, dir), weight, slot: wave.slot(p, i) as u32, path });
+                let (slot, density) = (wave.slot(p, i) as u32, f32::INFINITY);
+                later[list].push(Branch { origin, exact: (*point, dir), weight, density, slot, path });
             }
         }
     }

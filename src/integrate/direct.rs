@@ -1,4 +1,4 @@
-//! Direct light with mirror reflection and refraction.
+//! Direct light with mirror reflection and refraction, and what other integrators have in common with it.
 //!
 //! Source: Whitted, "An improved illumination model for shaded display", Communications of the ACM
 //! 23(6), 1980; what each material and light does is said in [`scene`](crate::scene).
@@ -6,12 +6,15 @@
 use std::slice::from_mut;
 
 use super::branches::Later;
+use super::camera::Samples8;
 use super::hits::{Exact, Shaded};
+use super::lamps::Lamps;
 use super::record::{RayCounts, RayKind, Record};
 use super::wave::{WAVE, Wave};
 use crate::accel::{PACKETS, Tile, Tree, Walk};
 use crate::lanes::{Float8, LANES, Mask8, Vec3x8, bits, float8};
 use crate::plan::{LeftOut, Plan, Skip};
+use crate::scene::{Integrator, RenderSettings};
 use crate::shade::{Backdrop8, LightTable, MaterialTable};
 
 /// All that is needed to find the radiance along rays.
@@ -23,7 +26,8 @@ pub struct Direct<'s> {
     pub(super) lights: LightTable,
     backdrop: Backdrop8<'s>,
     ambient: Option<Vec3x8>,
-    max_depth: u32,
+    pub(super) lamps: &'s Lamps<'s>,
+    pub(super) settings: RenderSettings,
 }
 
 /// Radiance and alpha of samples, by packet.
@@ -48,6 +52,8 @@ pub struct Room {
     pub wave: Box<Wave>,
     /// What became of the samples since [`Room::begin`].
     pub samples: Samples,
+    /// What numbers the samples since then draw, by packet, where [`Direct::draws`] any.
+    pub seeds: Vec<Samples8>,
     shadows: Box<Tile>,
     shaded: Vec<Shaded>,
     exact: Vec<Exact>,
@@ -58,6 +64,7 @@ pub struct Room {
 pub(super) struct Sink<'a, R: Record> {
     /// Along the rays of the wave.
     pub radiance: &'a mut [Vec3x8; PACKETS],
+    pub seeds: &'a [Samples8],
     pub shadows: &'a mut Tile,
     pub walk: &'a mut Walk,
     pub rays: &'a mut RayCounts,
@@ -73,6 +80,7 @@ impl Default for Room {
             left_out: LeftOut::default(),
             wave: Box::new(Wave::empty()),
             samples: Samples::default(),
+            seeds: Vec::new(),
             shadows: Box::new(Tile::empty()),
             shaded: vec![Shaded::NOTHING; PACKETS],
             exact: Vec::new(),
@@ -86,6 +94,7 @@ impl Room {
     pub fn begin(&mut self) {
         self.samples.radiance.clear();
         self.samples.alpha.clear();
+        self.seeds.clear();
     }
 
     /// The wave for the next 64 camera rays.
@@ -100,7 +109,7 @@ impl Room {
 
 impl<'s> Direct<'s> {
     /// Makes tables of the plan's materials and lights.
-    pub fn new(plan: &'s Plan<'s>, tree: &'s Tree, max_depth: u32) -> Self {
+    pub fn new(plan: &'s Plan<'s>, tree: &'s Tree, lamps: &'s Lamps<'s>, settings: RenderSettings) -> Self {
         let ambient = plan.scene.ambient.as_vec3().to_array();
         let is_needed = ambient != [0.0; 3] || !plan.skips.allows(Skip::Shading);
         Direct {
@@ -110,13 +119,24 @@ impl<'s> Direct<'s> {
             lights: LightTable::new(plan),
             backdrop: Backdrop8::new(&plan.scene.background.backdrop),
             ambient: is_needed.then(|| Vec3x8::splat(ambient)),
-            max_depth,
+            lamps,
+            settings,
         }
     }
 
     /// Whether rays are to be given in f64 as well, since rays may go on from what they meet.
     pub fn goes_on(&self) -> bool {
-        self.plan.scatters || !self.plan.skips.allows(Skip::Bounces)
+        self.is_path() || self.plan.scatters || !self.plan.skips.allows(Skip::Bounces)
+    }
+
+    /// Whether samples draw numbers for light.
+    pub fn draws(&self) -> bool {
+        self.settings.integrator != Integrator::Direct || self.lamps.draws()
+    }
+
+    #[inline(always)]
+    pub(super) fn is_path(&self) -> bool {
+        self.settings.integrator == Integrator::Path
     }
 
     /// Traces the camera rays of the wave, which where [`Direct::goes_on`] keep what they were before they were
@@ -128,9 +148,10 @@ impl<'s> Direct<'s> {
     /// Traces what goes on from the camera rays since [`Room::begin`], depth by depth, so that few of the tiles are
     /// not full. All rays of a sample keep their order, whatever other samples are there: so sums do as well.
     pub fn trace_later<R: Record>(&self, room: &mut Room, record: &mut R) {
-        for depth in 2..=self.max_depth {
+        for depth in 2..=self.settings.max_depth {
             let later = std::mem::take(&mut room.later);
-            for (kind, branches) in [RayKind::Reflection, RayKind::Refraction].into_iter().zip(later) {
+            let kinds = [RayKind::Reflection, RayKind::Refraction, RayKind::Bounce];
+            for (kind, branches) in kinds.into_iter().zip(later) {
                 for branches in branches.chunks(WAVE) {
                     room.wave.fill(branches, kind, depth);
                     self.trace(room, record);
@@ -144,7 +165,7 @@ impl<'s> Direct<'s> {
     }
 
     fn trace<R: Record>(&self, room: &mut Room, record: &mut R) {
-        let Room { walk, rays, left_out, wave, samples, shadows, shaded, exact, later } = room;
+        let Room { walk, rays, left_out, wave, samples, seeds, shadows, shaded, exact, later } = room;
         let kind = wave.kind as usize;
         let live: [u32; PACKETS] = std::array::from_fn(|p| wave.tile.packets[p].live().bits());
         let redecided = walk.counts.redecided;
@@ -154,6 +175,12 @@ impl<'s> Direct<'s> {
         let mut radiance = [Vec3x8::ZERO; PACKETS];
         let mut seen = 0;
         exact.clear();
+        let taken = {
+            let (shadows, walk, rays) = (&mut **shadows, &mut *walk, &mut *rays);
+            let (left_out, record) = (&mut *left_out, &mut *record);
+            let sink = &mut Sink { radiance: &mut radiance, seeds, shadows, walk, rays, left_out, record };
+            self.meet_lamps(wave, &live, sink)
+        };
         for (p, live) in live.into_iter().enumerate().filter(|(_, live)| *live != 0) {
             let hit = live & wave.tile.met(p).bits();
             rays.rays[kind] += u64::from(live.count_ones());
@@ -162,21 +189,31 @@ impl<'s> Direct<'s> {
             if R::ON {
                 self.tell(wave, p, live, record);
             }
-            self.add_background(wave, p, live & !hit, &mut radiance[p], samples);
+            self.add_background(wave, p, live & !hit & !taken[p], &mut radiance[p], samples);
+            let hit = hit & !taken[p];
             if hit != 0 {
                 seen |= 1 << p;
                 self.shade(wave, (p, hit), &mut shaded[p], exact, record);
                 self.add_ambient(wave, &shaded[p], &mut radiance[p]);
             }
         }
-        let sink = &mut Sink { radiance: &mut radiance, shadows, walk, rays, left_out, record };
-        for light in self.lights.iter() {
-            self.add_light(light, wave, (shaded, seen), sink);
+        let sink = &mut Sink { radiance: &mut radiance, seeds, shadows, walk, rays, left_out, record };
+        match self.settings.integrator {
+            Integrator::Ao => self.add_openness(wave, (shaded, seen), sink),
+            Integrator::Direct | Integrator::Path => {
+                for light in self.lights.iter() {
+                    self.add_light(light, wave, (shaded, seen), sink);
+                }
+                self.add_lamps(wave, (shaded, seen), sink);
+            }
+        }
+        if wave.depth < self.settings.max_depth && self.goes_on() {
+            match self.settings.integrator {
+                Integrator::Path => self.take_ways(wave, shaded, exact, seeds, later),
+                Integrator::Direct | Integrator::Ao => self.branches(wave, shaded, exact, later),
+            }
         }
         samples.add(wave, &live, &radiance);
-        if wave.depth < self.max_depth && self.goes_on() {
-            self.branches(wave, shaded, exact, later);
-        }
     }
 
     fn tell<R: Record>(&self, wave: &Wave, p: usize, live: u32, record: &mut R) {
@@ -198,14 +235,18 @@ impl<'s> Direct<'s> {
             samples.alpha[wave.first / LANES + p] = alpha;
         }
         if miss != 0 && !transparent {
-            let seen = wave.weighted(p, self.backdrop.radiance(wave.tile.packets[p].dir, miss));
-            *radiance = Vec3x8::select(Mask8::from_bits(miss), seen, Vec3x8::ZERO);
+            let mut seen = self.backdrop.radiance(wave.tile.packets[p].dir, miss);
+            if wave.kind == RayKind::Bounce {
+                seen = self.weigh_background(wave, p, miss, seen);
+            }
+            let seen = wave.weighted(p, seen);
+            *radiance = Vec3x8::select(Mask8::from_bits(miss), *radiance + seen, *radiance);
         }
     }
 
     #[inline(always)]
     fn add_ambient(&self, wave: &Wave, shaded: &Shaded, radiance: &mut Vec3x8) {
-        if let Some(ambient) = self.ambient {
+        if let Some(ambient) = self.ambient.filter(|_| self.settings.integrator != Integrator::Ao) {
             let albedo = shaded.bsdf.color * shaded.bsdf.diffuse;
             let seen = wave.weighted(shaded.packet, albedo.scale(ambient));
             *radiance = Vec3x8::select(Mask8::from_bits(shaded.hit), *radiance + seen, *radiance);

@@ -162,7 +162,7 @@ impl Direct<'_> {
         let (rays, t) = (&wave.exact[p], wave.tile.packets[p].t_max.to_array());
         let all = !self.plan.skips.allows(Skip::Bounces);
         for i in bits(hit) {
-            let goes_on = self.plan.goes_on[owners[i].material as usize];
+            let goes_on = self.is_path() || self.plan.goes_on[owners[i].material as usize];
             if !goes_on && !all {
                 continue;
             }

@@ -21,7 +21,7 @@ struct Shares {
 }
 
 /// Hits by packet, and the packets that have any.
-type Hits<'a> = (&'a [Shaded], u32);
+pub(super) type Hits<'a> = (&'a [Shaded], u32);
 
 impl Direct<'_> {
     /// Adds one light, by its index, to the radiance along a wave.
@@ -94,12 +94,25 @@ impl Direct<'_> {
                 cast => hits.0[p].shadow_rays(light, Mask8::from_bits(cast)),
             };
         }
+        self.settle(index, wave, hits.1, (&shares.cast, &mut shares.lit), sink);
+    }
+
+    /// Traces the shadow rays of a light, and takes the lanes that lie in shadow out of `lit`.
+    pub(super) fn settle<R: Record>(
+        &self,
+        index: usize,
+        wave: &Wave,
+        packets: u32,
+        (cast, lit): (&[u32; PACKETS], &mut [u32; PACKETS]),
+        sink: &mut Sink<R>,
+    ) {
+        let tile = &mut *sink.shadows;
         let told = R::ON.then_some(tile.packets);
         let redecided = sink.walk.counts.redecided;
         self.tree.occluded_tiles(from_mut(tile), sink.walk);
         sink.rays.redecided[RayKind::Shadow as usize] += sink.walk.counts.redecided - redecided;
-        for p in bits(hits.1) {
-            let (cast, lit) = (shares.cast[p], &mut shares.lit[p]);
+        for p in bits(packets) {
+            let (cast, lit) = (cast[p], &mut lit[p]);
             let bright = cast & tile.packets[p].live().bits();
             sink.rays.rays[RayKind::Shadow as usize] += u64::from(cast.count_ones());
             sink.rays.hits[RayKind::Shadow as usize] += u64::from((cast & !bright).count_ones());
@@ -119,6 +132,12 @@ impl Shaded {
     /// What one light gives without regard to shadows, and the lanes that face it where it gives anything.
     #[inline(always)]
     fn share(&self, wi: Vec3x8, strength: Vec3x8) -> (Vec3x8, Mask8) {
+        self.weighed_share(wi, strength, float8(1.0))
+    }
+
+    /// The same with a factor on what is scattered evenly.
+    #[inline(always)]
+    pub(super) fn weighed_share(&self, wi: Vec3x8, strength: Vec3x8, factor: Float8) -> (Vec3x8, Mask8) {
         let (cos, cos_g) = (self.n_s.dot(wi), self.n_g.dot(wi));
         let zero = Float8::ZERO;
         let facing = Mask8::gt(cos, zero) & Mask8::gt(cos_g, zero) & Mask8::gt(self.bsdf.lit, zero);
@@ -131,7 +150,16 @@ impl Shaded {
             let mirrored = self.n_s.mul_add(cos + cos, -wi);
             mirrored.dot(self.wo)
         };
-        (self.bsdf.response(diffuse, highlight).scale(strength), facing)
+        (self.bsdf.response(diffuse * factor, highlight).scale(strength), facing)
+    }
+
+    /// The factor that softens the terminator of interpolated normals; 1 elsewhere.
+    #[inline(always)]
+    pub(super) fn softened(&self, wi: Vec3x8) -> Float8 {
+        match self.smooth.any() {
+            true => self.smooth.select(self.terminator(self.n_s.dot(wi), self.n_g.dot(wi)), float8(1.0)),
+            false => float8(1.0),
+        }
     }
 
     /// Source: Chiang, Li and Burley, "Taming the shadow terminator", SIGGRAPH 2019 talks.

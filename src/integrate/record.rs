@@ -18,11 +18,14 @@ pub enum RayKind {
     Reflection,
     /// Through a surface.
     Refraction,
+    /// Scattered by a surface.
+    Bounce,
 }
 
 impl RayKind {
     /// All kinds, by their number.
-    pub const ALL: [RayKind; 4] = [RayKind::Camera, RayKind::Shadow, RayKind::Reflection, RayKind::Refraction];
+    pub const ALL: [RayKind; 5] =
+        [RayKind::Camera, RayKind::Shadow, RayKind::Reflection, RayKind::Refraction, RayKind::Bounce];
 
     /// The word for it in statistics.
     pub fn name(self) -> &'static str {
@@ -31,6 +34,7 @@ impl RayKind {
             RayKind::Shadow => "shadow",
             RayKind::Reflection => "reflection",
             RayKind::Refraction => "refraction",
+            RayKind::Bounce => "bounce",
         }
     }
 }
@@ -73,8 +77,8 @@ impl RayCounts {
     }
 }
 
-/// Looks on while rays are traced. A path is 1 for the camera ray, 2p for the ray reflected and 2p + 1 for
-/// the one refracted where path p ended; a slot is the sample's place in its batch.
+/// Looks on while rays are traced. A path is 1 for the camera ray, 2p for the ray reflected or scattered and
+/// 2p + 1 for the one refracted where path p ended; a slot is the sample's place in its batch.
 pub trait Record {
     /// Whether anything is to be told: what only the record needs is left out otherwise.
     const ON: bool;
@@ -86,6 +90,8 @@ pub trait Record {
     fn shadow(&mut self, light: usize, ray: Ray, dark: bool, slot: usize, path: u32);
     /// A light that casts no shadows shone on a surface.
     fn lit(&mut self, light: usize, slot: usize, path: u32);
+    /// A ray met a light itself, and ended there.
+    fn seen(&mut self, light: usize, slot: usize, path: u32);
     /// A surface took its colour from a cell of a texture.
     fn texture(&mut self, texture: usize, cell: i64, slot: usize, path: u32);
 
@@ -158,5 +164,6 @@ impl Record for Silent {
     fn ray(&mut self, _: RayKind, _: Ray, _: Option<u32>, _: f32, _: usize, _: u32) {}
     fn shadow(&mut self, _: usize, _: Ray, _: bool, _: usize, _: u32) {}
     fn lit(&mut self, _: usize, _: usize, _: u32) {}
+    fn seen(&mut self, _: usize, _: usize, _: u32) {}
     fn texture(&mut self, _: usize, _: i64, _: usize, _: u32) {}
 }

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::record::RayKind;
 use crate::accel::{PACKETS, Tile};
-use crate::lanes::{ExactPacket, LANES, Mask8, Ray, RayPacket, Vec3x8, float8};
+use crate::lanes::{ExactPacket, Float8, LANES, Mask8, Ray, RayPacket, Vec3x8, float8};
 
 /// Rays of a wave.
 pub const WAVE: usize = PACKETS * LANES;
@@ -26,6 +26,8 @@ pub struct Wave {
     weight: [Vec3x8; PACKETS],
     /// How each ray came about, but for camera rays.
     paths: [[u32; LANES]; PACKETS],
+    /// With which each ray was drawn, per steradian, where they are scattered.
+    pub(super) density: [Float8; PACKETS],
     /// The rays before they were rounded, where rays go on from what they meet.
     pub exact: [ExactPacket; PACKETS],
 }
@@ -38,6 +40,8 @@ pub(super) struct Branch {
     /// On the surface, and where to from there.
     pub exact: (DVec3, DVec3),
     pub weight: [f32; 3],
+    /// With which a scattered ray was drawn, per steradian.
+    pub density: f32,
     pub slot: u32,
     pub path: u32,
 }
@@ -53,6 +57,7 @@ impl Wave {
             slots: [[0; LANES]; PACKETS],
             weight: [Vec3x8::ZERO; PACKETS],
             paths: [[0; LANES]; PACKETS],
+            density: [Float8::ZERO; PACKETS],
             exact: [ExactPacket::default(); PACKETS],
         }
     }
@@ -75,6 +80,7 @@ impl Wave {
             let dir = Vec3x8::from_fn(|i| lane(i).exact.1.as_vec3().to_array());
             self.tile.packets[p] = RayPacket::new(origin, dir, float8(f32::INFINITY), live);
             self.weight[p] = Vec3x8::from_fn(|i| lane(i).weight);
+            self.density[p] = Float8::from(std::array::from_fn::<f32, LANES, _>(|i| lane(i).density));
             for (i, branch) in branches.iter().enumerate() {
                 (self.slots[p][i], self.paths[p][i]) = (branch.slot, branch.path);
                 self.exact[p].set_lane(i, branch.exact.0, branch.exact.1);

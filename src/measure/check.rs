@@ -89,6 +89,7 @@ pub struct RayReports {
     pub shadow: RayReport,
     pub reflection: RayReport,
     pub refraction: RayReport,
+    pub bounce: RayReport,
 }
 
 /// Replayed rays of one kind.
@@ -265,7 +266,7 @@ impl Judge<'_, '_> {
         let exact = match cast.kind {
             RayKind::Shadow => return self.reference.verdict_occluded_exact(ray, met.is_some()),
             RayKind::Camera => self.reference.verdict_exact(&self.view.sample(x, y, sample), met),
-            RayKind::Reflection | RayKind::Refraction => self.reference.verdict_exact(ray, met),
+            RayKind::Reflection | RayKind::Refraction | RayKind::Bounce => self.reference.verdict_exact(ray, met),
         };
         match (exact, self.reference.verdict(ray, met, met.map(|_| cast.t))) {
             (Verdict::Same, Verdict::Different { expected, expected_t }) => Verdict::Different { expected, expected_t },
@@ -377,6 +378,7 @@ impl Record for Tape {
             RayKind::Camera | RayKind::Shadow => EventKind::Camera,
             RayKind::Reflection => EventKind::Reflection,
             RayKind::Refraction => EventKind::Refraction,
+            RayKind::Bounce => EventKind::Bounce,
         };
         self.note(slot, path, event, met.map_or(-1, i64::from), Some(Cast { kind, ray, met, t }));
     }
@@ -388,6 +390,10 @@ impl Record for Tape {
 
     fn lit(&mut self, light: usize, slot: usize, path: u32) {
         self.note(slot, path, EventKind::Light(light as u32), 1, None);
+    }
+
+    fn seen(&mut self, light: usize, slot: usize, path: u32) {
+        self.note(slot, path, EventKind::Light(light as u32), 2, None);
     }
 
     fn texture(&mut self, texture: usize, cell: i64, slot: usize, path: u32) {
@@ -418,11 +424,12 @@ impl RayReports {
             RayKind::Shadow => &mut self.shadow,
             RayKind::Reflection => &mut self.reflection,
             RayKind::Refraction => &mut self.refraction,
+            RayKind::Bounce => &mut self.bounce,
         }
     }
 
     /// All kinds by name.
-    pub fn by_kind(&self) -> [(&'static str, RayReport); 4] {
+    pub fn by_kind(&self) -> [(&'static str, RayReport); 5] {
         let mut all = *self;
         RayKind::ALL.map(|kind| (kind.name(), *all.of(kind)))
     }

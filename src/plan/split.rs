@@ -1,8 +1,9 @@
 //! Polygons into convex pieces of at most eight corners. All corners of the pieces are corners of the
 //! polygon, so that neighbours share their end points to the bit.
 
-use earcut::Earcut;
 use glam::DVec3;
+
+use crate::scene::split::triangles;
 
 /// Most corners of a piece.
 const MOST: usize = 8;
@@ -36,23 +37,6 @@ fn fans(corners: &[DVec3]) -> Vec<Vec<DVec3>> {
         std::iter::once(corners[0]).chain(corners[first..=last].iter().copied()).collect()
     };
     starts.map(fan).collect()
-}
-
-fn triangles(corners: &[DVec3], normal: DVec3) -> Vec<Vec<DVec3>> {
-    let (x, y) = crate::scene::basis(normal);
-    let origin = corners[0];
-    let flat: Vec<[f64; 2]> = corners.iter().map(|c| [(*c - origin).dot(x), (*c - origin).dot(y)]).collect();
-    let mut indices: Vec<u32> = Vec::new();
-    Earcut::new().earcut_slice(&flat, &[], &mut indices);
-    let triangle = |abc: &[u32]| {
-        let mut t: Vec<DVec3> = abc.iter().map(|i| corners[*i as usize]).collect();
-        let turn = (t[1] - t[0]).cross(t[2] - t[0]).dot(normal);
-        if turn < 0.0 {
-            t.swap(1, 2);
-        }
-        (turn != 0.0).then_some(t)
-    };
-    indices.chunks_exact(3).filter_map(triangle).collect()
 }
 
 #[cfg(test)]

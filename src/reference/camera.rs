@@ -22,8 +22,8 @@ pub struct View {
     seed: u64,
     /// Samples per pixel.
     pub(super) spp: u32,
-    /// Longest chain of rays.
-    pub(super) max_depth: u32,
+    /// What is computed, and how far.
+    pub(super) settings: RenderSettings,
 }
 
 impl Reference {
@@ -41,7 +41,7 @@ impl Reference {
             filter: FilterTable::new(image.filter),
             seed: render.seed,
             spp: image.spp.max(1),
-            max_depth: render.max_depth,
+            settings: render.clone(),
         }
     }
 }
@@ -53,7 +53,7 @@ impl View {
         if self.spp == 1 {
             return (center_x, center_y);
         }
-        let key = sample::pixel_key(self.seed, x, y);
+        let key = self.key(x, y);
         let [a, b] = sample::pair(key, sample, sample::dimension::FILTER);
         (center_x + self.filter.offset(a), center_y + self.filter.offset(b))
     }
@@ -78,10 +78,15 @@ impl View {
         self.spp
     }
 
+    /// The name of a pixel's sample patterns.
+    pub fn key(&self, x: i32, y: i32) -> u32 {
+        sample::pixel_key(self.seed, x, y)
+    }
+
     /// The camera ray of a sample of a pixel.
     pub fn sample(&self, x: i32, y: i32, sample: u32) -> Ray {
         let (px, py) = self.point(x, y, sample);
-        let key = sample::pixel_key(self.seed, x, y);
+        let key = self.key(x, y);
         match self.lens {
             Lens::ThinLens { .. } => self.ray(px, py, sample::pair(key, sample, sample::dimension::LENS)),
             Lens::Pinhole { .. } | Lens::Orthographic { .. } | Lens::Panoramic => self.ray(px, py, [0; 2]),

@@ -1,14 +1,19 @@
-//! Pixels: direct light with mirror reflection and refraction, ray by ray.
+//! Pixels: direct light with mirror reflection and refraction, ambient occlusion, paths; ray by ray.
 //!
 //! Source: Whitted, "An improved illumination model for shaded display", Communications of the ACM
 //! 23(6), 1980; what each material and light contributes is said in their doc comments.
 
+use std::f64::consts::PI;
+
 use glam::{DVec2, DVec3};
 
-use super::light::arrive;
+use super::emitter::arrive_from_sky;
+use super::light::{Arrival, arrive};
 use super::material::{Onward, Side, albedo, onward, reflectance};
-use super::{Hit, Ray, Reference, View, background, texture};
-use crate::scene::{Light, Model, Paint};
+use super::path::{scattered, share};
+use super::{Hit, Ray, Reference, View, texture};
+use crate::sample::dimension;
+use crate::scene::{Integrator, Model, Paint, RenderSettings};
 
 /// One pixel of the picture.
 #[derive(Debug, Clone, Default)]
@@ -64,6 +69,8 @@ pub struct RayCounts {
     pub reflection: u64,
     /// Into or out of a body.
     pub refraction: u64,
+    /// Scattered.
+    pub bounce: u64,
 }
 
 /// One decision on the way to a pixel, named so that two tracers can compare theirs.
@@ -72,12 +79,12 @@ pub struct Event {
     /// Sample of the pixel.
     pub sample: u32,
     /// The ray: the camera ray is 1, the reflected child of `p` is `2 p`, the refracted one `2 p + 1`
-    /// (modulo 2^32). For lights and textures, the ray that met the surface.
+    /// (modulo 2^32), a scattered one `2 p`. For lights and textures, the ray that met the surface.
     pub path: u32,
     /// What was decided.
     pub kind: EventKind,
     /// How: of a ray the primitive it met, or -1; of a light 1 where it shines on the place, 0 where it
-    /// is hidden, faces away or gives nothing; of a texture the cell it was read from.
+    /// is hidden, faces away or gives nothing, 2 where the ray itself meets it; of a texture the cell it was read from.
     pub outcome: i64,
 }
 
@@ -90,7 +97,9 @@ pub enum EventKind {
     Reflection,
     /// A refracted ray.
     Refraction,
-    /// A light, by its index, at a surface that scatters light.
+    /// A scattered ray.
+    Bounce,
+    /// A light, by its index, at a surface that scatters light; the sky comes after the last.
     Light(u32),
     /// A texture, by its index, of the surface that the ray met. The cell is 0 or 1 in a checker, the
     /// number of the (upper left) texel in a picture, row by row.
@@ -99,13 +108,23 @@ pub enum EventKind {
 
 /// A ray still to be traced.
 #[derive(Debug, Clone, Copy)]
-struct Step {
-    ray: Ray,
-    kind: EventKind,
-    depth: u32,
-    path: u32,
+pub(super) struct Step {
+    pub ray: Ray,
+    pub kind: EventKind,
+    pub depth: u32,
+    pub path: u32,
     /// Share of its radiance that reaches the pixel.
-    weight: DVec3,
+    pub weight: DVec3,
+    /// With which its direction was drawn, per steradian; infinite where it is the only one.
+    pub density: f64,
+}
+
+impl Step {
+    /// A ray that goes on from where this one met something; `weight` is all of it.
+    pub fn next(&self, kind: EventKind, path: u32, weight: DVec3, origin: DVec3, dir: DVec3, density: f64) -> Step {
+        let ray = Ray { origin, dir, t_min: 0.0, t_max: f64::INFINITY };
+        Step { ray, kind, depth: self.depth + 1, path, weight, density }
+    }
 }
 
 impl Reference {
@@ -117,7 +136,8 @@ impl Reference {
         for sample in 0..view.spp {
             let distance = view.distance(x, y, sample);
             pixel.samples.push(CameraSample { distance, ..CameraSample::default() });
-            let mut walk = Walk { tracer: self, view, sample, max_depth: view.max_depth, pixel: &mut pixel };
+            let (key, settings) = (view.key(x, y), &view.settings);
+            let mut walk = Walk { tracer: self, view, key, sample, settings, pixel: &mut pixel };
             let (radiance, alpha) = walk.radiance(view.sample(x, y, sample));
             pixel.samples[sample as usize].radiance = radiance;
             for (sum, value) in pixel.rgba.iter_mut().zip([radiance.x, radiance.y, radiance.z, alpha]) {
@@ -130,11 +150,13 @@ impl Reference {
 }
 
 /// One sample of a pixel in the making.
-struct Walk<'a> {
-    tracer: &'a Reference,
+pub(super) struct Walk<'a> {
+    pub tracer: &'a Reference,
     view: &'a View,
-    sample: u32,
-    max_depth: u32,
+    /// Of the pixel's sample patterns.
+    pub key: u32,
+    pub sample: u32,
+    settings: &'a RenderSettings,
     pixel: &'a mut Pixel,
 }
 
@@ -142,12 +164,21 @@ impl Walk<'_> {
     /// Radiance and alpha of a camera ray. A ray beyond the depth limit is black.
     fn radiance(&mut self, camera: Ray) -> (DVec3, f64) {
         let (mut radiance, mut alpha) = (DVec3::ZERO, 1.0);
-        let mut steps = vec![Step { ray: camera, kind: EventKind::Camera, depth: 1, path: 1, weight: DVec3::ONE }];
+        let (kind, density) = (EventKind::Camera, f64::INFINITY);
+        let mut steps = vec![Step { ray: camera, kind, depth: 1, path: 1, weight: DVec3::ONE, density }];
         while let Some(step) = steps.pop() {
-            if step.depth > self.max_depth {
+            if step.depth > self.settings.max_depth {
                 continue;
             }
             let hit = self.trace(&step);
+            let far = hit.as_ref().map_or(f64::INFINITY, |hit| hit.t);
+            if step.kind == EventKind::Bounce {
+                radiance += step.weight * self.scattered_light(&step, far);
+            } else if let Some((index, seen)) = self.light_seen(&step, far) {
+                self.event(&step, EventKind::Light(index as u32), 2);
+                radiance += step.weight * seen;
+                continue;
+            }
             radiance += step.weight
                 * match &hit {
                     Some(hit) => self.scatter(&step, hit, &mut steps),
@@ -155,7 +186,7 @@ impl Walk<'_> {
                         alpha = 0.0;
                         DVec3::ZERO
                     }
-                    None => background::radiance(&self.tracer.background.backdrop, step.ray.dir),
+                    None => self.background(&step),
                 };
         }
         (radiance, alpha)
@@ -167,6 +198,7 @@ impl Walk<'_> {
             EventKind::Camera => rays.camera += 1,
             EventKind::Reflection => rays.reflection += 1,
             EventKind::Refraction => rays.refraction += 1,
+            EventKind::Bounce => rays.bounce += 1,
             EventKind::Light(_) | EventKind::Texture(_) => {}
         }
         let hit = self.tracer.closest(&step.ray);
@@ -197,33 +229,54 @@ impl Walk<'_> {
                 uv: hit.uv,
             });
         }
-        let Onward { reflected, refracted } = onward(&material.model, color, &side, hit.front);
-        let mut go_on = |kind, path: u32, weight: DVec3, dir| {
-            let ray = Ray { origin: hit.spawn(dir), dir, t_min: 0.0, t_max: f64::INFINITY };
-            steps.push(Step { ray, kind, depth: step.depth + 1, path, weight: step.weight * weight });
-        };
-        let child = step.path.wrapping_mul(2);
-        if let Some(weight) = reflected {
-            go_on(EventKind::Reflection, child, weight, side.reflection());
-        }
-        if let Some((weight, dir)) = refracted {
-            go_on(EventKind::Refraction, child.wrapping_add(1), weight, dir);
+        let onward = onward(&material.model, color, &side, hit.front);
+        match self.settings.integrator {
+            Integrator::Path => self.take_one(step, hit, &side, (&material.model, color), &onward, steps),
+            Integrator::Direct | Integrator::Ao => take_all(step, hit, &side, &onward, steps),
         }
         match material.model {
             Model::Mirror { .. } | Model::Dielectric { .. } => DVec3::ZERO,
+            Model::Diffuse { .. } | Model::Phong { .. } if self.settings.integrator == Integrator::Ao => {
+                self.openness(step, hit, &side) * albedo(&material.model, color)
+            }
             Model::Diffuse { .. } | Model::Phong { .. } => {
                 let ambient = self.tracer.ambient * albedo(&material.model, color);
-                let tracer = self.tracer;
-                let lights = tracer.lights.iter().enumerate();
-                ambient
-                    + lights
-                        .map(|(i, light)| {
-                            let (irradiance, wi) = self.light(step, hit, &side, i, light);
-                            irradiance * side.scatter(&material.model, color, wi)
-                        })
-                        .sum::<DVec3>()
+                ambient + self.lights(step, hit, &side, &material.model, color)
             }
         }
+    }
+
+    /// Light from all lights, the sky among them.
+    fn lights(&mut self, step: &Step, hit: &Hit, side: &Side, model: &Model, color: DVec3) -> DVec3 {
+        let tracer = self.tracer;
+        let mut sum = DVec3::ZERO;
+        for (i, light) in tracer.lights.iter().enumerate() {
+            let place = self.pair(step.depth, dimension::LIGHTS + i as u32);
+            let arrival = match &tracer.areas[i] {
+                Some(area) => area.arrive(hit.point, place),
+                None => arrive(&light.source, hit.point),
+            };
+            sum += self.light(step, hit, side, (i, light.shadows), arrival, (model, color));
+        }
+        if let Some(sky) = &tracer.sky {
+            let i = tracer.lights.len();
+            let place = self.pair(step.depth, dimension::LIGHTS + i as u32);
+            let arrival = arrive_from_sky(sky, &tracer.background, place);
+            sum += self.light(step, hit, side, (i, true), arrival, (model, color));
+        }
+        sum
+    }
+
+    /// 1 where a scattered ray meets nothing near, else 0.
+    fn openness(&mut self, step: &Step, hit: &Hit, side: &Side) -> f64 {
+        let dir = scattered(side.n, self.pair(step.depth, dimension::SCATTER));
+        let t_max = self.settings.ao_distance;
+        let open = side.faces(dir) && {
+            self.pixel.rays.shadow += 1;
+            !self.tracer.occluded(&Ray { origin: hit.spawn(dir), dir, t_min: 0.0, t_max })
+        };
+        self.event(step, EventKind::Light(self.tracer.lights.len() as u32), i64::from(open));
+        if open { side.terminator(dir) } else { 0.0 }
     }
 
     /// The material's colour at a hit.
@@ -242,20 +295,48 @@ impl Walk<'_> {
         paint * self.tracer.placed[hit.primitive].color
     }
 
-    /// Irradiance from one light and the direction to it; zero where it does not shine.
+    /// Radiance from one light; zero where it does not shine.
     ///
     /// One shadow ray is traced for each light that the surface faces and that gives anything there,
     /// unless it casts no shadows.
-    fn light(&mut self, step: &Step, hit: &Hit, side: &Side, index: usize, light: &Light) -> (DVec3, DVec3) {
-        let arrival = arrive(&light.source, hit.point).filter(|arrival| side.faces(arrival.wi));
-        let lit = arrival.filter(|arrival| {
-            if !light.shadows {
+    fn light(
+        &mut self,
+        step: &Step,
+        hit: &Hit,
+        side: &Side,
+        (index, shadows): (usize, bool),
+        arrival: Option<Arrival>,
+        (model, color): (&Model, DVec3),
+    ) -> DVec3 {
+        let gives = |arrival: &Arrival| arrival.irradiance != DVec3::ZERO && side.faces(arrival.wi);
+        let lit = arrival.filter(gives).filter(|arrival| {
+            if !shadows {
                 return true;
             }
             self.pixel.rays.shadow += 1;
             !self.tracer.occluded(&arrival.shadow_ray(hit.spawn(arrival.wi)))
         });
         self.event(step, EventKind::Light(index as u32), i64::from(lit.is_some()));
-        lit.map_or((DVec3::ZERO, side.n), |arrival| (arrival.irradiance, arrival.wi))
+        let path = self.settings.integrator == Integrator::Path && step.depth < self.settings.max_depth;
+        lit.map_or(DVec3::ZERO, |arrival| {
+            // What shades nothing is left to the lights alone.
+            let weighed = path && shadows;
+            let weight = if weighed { share(arrival.density, side.n.dot(arrival.wi) / PI) } else { 1.0 };
+            arrival.irradiance * side.scatter(model, color, arrival.wi, weight)
+        })
+    }
+}
+
+/// Adds the reflected and the refracted ray.
+fn take_all(step: &Step, hit: &Hit, side: &Side, onward: &Onward, steps: &mut Vec<Step>) {
+    let mut go_on = |kind, path: u32, weight: DVec3, dir| {
+        steps.push(step.next(kind, path, step.weight * weight, hit.spawn(dir), dir, f64::INFINITY));
+    };
+    let child = step.path.wrapping_mul(2);
+    if let Some(weight) = onward.reflected {
+        go_on(EventKind::Reflection, child, weight, side.reflection());
+    }
+    if let Some((weight, dir)) = onward.refracted {
+        go_on(EventKind::Refraction, child.wrapping_add(1), weight, dir);
     }
 }

@@ -12,23 +12,26 @@ pub struct Arrival {
     pub wi: DVec3,
     /// Irradiance on a plane that faces the light.
     pub irradiance: DVec3,
+    /// With which `wi` was drawn, per steradian; infinite where it is the only one.
+    pub density: f64,
     /// Where the light is; `None`: infinitely far.
-    position: Option<DVec3>,
+    pub(super) position: Option<DVec3>,
 }
 
-/// A light in coordinates relative to `origin`.
+/// A light in coordinates relative to `origin`; area lights stay as they are, see [`super::emitter`].
 pub fn relative(light: &Light, origin: DVec3) -> Light {
     let mut light = light.clone();
     match &mut light.source {
         Source::Point { position, .. } | Source::Spot { position, .. } => *position -= origin,
-        Source::Directional { .. } => {}
+        Source::Directional { .. } | Source::Area { .. } => {}
     }
     light
 }
 
-/// What a source gives at `point`; `None` where it gives nothing: at the light itself, outside a
-/// spot's cone.
+/// What a source without an area gives at `point`; `None` where it gives nothing: at the light itself,
+/// outside a spot's cone.
 pub fn arrive(source: &Source, point: DVec3) -> Option<Arrival> {
+    let density = f64::INFINITY;
     let arrival = match *source {
         Source::Point { position, intensity, falloff } => {
             let (wi, distance) = (position - point).normalize_and_length();
@@ -36,16 +39,17 @@ pub fn arrive(source: &Source, point: DVec3) -> Option<Arrival> {
                 Falloff::InverseSquare => intensity / (distance * distance),
                 Falloff::None => intensity,
             };
-            Arrival { wi, irradiance, position: Some(position) }
+            Arrival { wi, irradiance, density, position: Some(position) }
         }
         Source::Directional { direction, irradiance } => {
-            Arrival { wi: -direction.normalize(), irradiance, position: None }
+            Arrival { wi: -direction.normalize(), irradiance, density, position: None }
         }
         Source::Spot { position, direction, intensity, cone, penumbra } => {
             let (wi, distance) = (position - point).normalize_and_length();
             let share = spot_share(-wi, direction, cone, penumbra);
-            Arrival { wi, irradiance: share * intensity / (distance * distance), position: Some(position) }
+            Arrival { wi, irradiance: share * intensity / (distance * distance), density, position: Some(position) }
         }
+        Source::Area { .. } => return None,
     };
     let gives = arrival.irradiance.is_finite() && arrival.irradiance != DVec3::ZERO;
     (gives && arrival.position != Some(point)).then_some(arrival)

@@ -60,8 +60,9 @@ impl Side {
 
     /// Radiance toward the viewer per irradiance from `wi`, for a side that faces it; `color` is the
     /// material's paint here.
-    pub fn scatter(&self, model: &Model, color: DVec3, wi: DVec3) -> DVec3 {
-        let cosine = self.n.dot(wi) * self.terminator(wi);
+    /// `diffuse` is a factor on what is scattered evenly.
+    pub fn scatter(&self, model: &Model, color: DVec3, wi: DVec3, diffuse: f64) -> DVec3 {
+        let cosine = diffuse * self.n.dot(wi) * self.terminator(wi);
         match *model {
             Model::Diffuse { .. } => color * (cosine / PI),
             Model::Phong { kd, ks, shine, .. } => {
@@ -75,7 +76,7 @@ impl Side {
 
     /// The factor on the light's cosine that softens the terminator of interpolated normals: 1 where
     /// both normals are the same.
-    fn terminator(&self, wi: DVec3) -> f64 {
+    pub fn terminator(&self, wi: DVec3) -> f64 {
         if self.n == self.n_g {
             return 1.0;
         }

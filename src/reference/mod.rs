@@ -11,8 +11,8 @@
 //! | `quadratic`, `span` | what round and what convex bodies have in common |
 //! | `exact` | sums and products beyond f64, where those would cancel |
 //! | `margin` | what f32 cannot decide |
-//! | `camera`, `light`, `material`, `texture`, `background` | the doc comments of the scene, as formulas |
-//! | `integrator` | pixels, samples, the tree of rays |
+//! | `camera`, `light`, `emitter`, `material`, `texture`, `background` | the doc comments of the scene, as formulas |
+//! | `integrator`, `path` | pixels, samples, the tree of rays, one path of it |
 //!
 //! Far from the origin nothing is lost: positions are only ever used as differences.
 
@@ -23,12 +23,14 @@ mod cone;
 mod cuboid;
 mod cylinder;
 mod disk;
+mod emitter;
 mod exact;
 mod integrator;
 mod light;
 mod line;
 mod margin;
 mod material;
+mod path;
 mod plane;
 mod polygon;
 mod quadratic;
@@ -41,9 +43,10 @@ mod texture;
 use glam::{DVec2, DVec3};
 
 use self::body::Body;
+use self::emitter::AreaLight;
 use self::line::{Line, Root};
 use self::margin::Found;
-use crate::scene::{Background, Light, Material, Scene, Texture, Visible};
+use crate::scene::{Background, Light, Material, Scene, Sky, Texture, Visible};
 
 pub use self::camera::View;
 pub use self::integrator::{CameraSample, Event, EventKind, First, Pixel, RayCounts};
@@ -63,7 +66,11 @@ pub struct Reference {
     textures: Vec<Texture>,
     /// Relative to `origin`.
     lights: Vec<Light>,
+    /// By light: those with an area.
+    areas: Vec<Option<AreaLight>>,
     background: Background,
+    /// The background as a light.
+    sky: Option<Sky>,
     ambient: DVec3,
 }
 
@@ -138,7 +145,9 @@ impl Reference {
             materials: scene.materials.clone(),
             textures: scene.textures.clone(),
             lights: scene.lights.iter().map(|light| light::relative(light, origin)).collect(),
+            areas: scene.lights.iter().map(|light| AreaLight::new(light, origin)).collect(),
             background: scene.background.clone(),
+            sky: scene.background.sky(),
             ambient: scene.ambient,
         }
     }

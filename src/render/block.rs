@@ -158,6 +158,9 @@ impl<R: Record> Work<'_, '_, R> {
         }
         let met = self.room.rays.hits[RayKind::Camera as usize];
         batch.fill::<R>(self.room.camera_wave(self.rays.common_origin()), self.rays, self.direct.goes_on());
+        if self.direct.draws() {
+            self.room.seeds.extend(batch.samples);
+        }
         self.direct.trace_camera(&mut self.room, self.record);
         if R::SURFACES {
             let Batch { samples, count, pixels, traced, distances } = &*batch;

@@ -23,10 +23,10 @@ pub use self::task::{Task, Traced};
 use self::block::Block;
 use crate::accel::Tree;
 use crate::film::{Picture, Window};
-use crate::integrate::{CameraRays, Direct, RayCounts, Record};
+use crate::integrate::{CameraRays, Direct, Lamps, RayCounts, Record};
 use crate::output::{self, Description, Losses, Options, OutputError};
 use crate::plan::{InvalidScene, Plan, SkipSet, validate};
-use crate::scene::{Camera, ImageSettings, Integrator, Layers, Scene};
+use crate::scene::{Camera, ImageSettings, Integrator, Layers, RenderSettings, Scene};
 
 /// Which tracer finds the hits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -114,9 +114,7 @@ pub struct Renderer<'s> {
     next: Option<&'s Scene>,
     window: Option<Window>,
     overscan: [u32; 2],
-    integrator: Integrator,
-    max_depth: u32,
-    seed: u64,
+    settings: RenderSettings,
     threads: usize,
     skips: SkipSet,
     certify: bool,
@@ -168,9 +166,7 @@ impl<'s> Renderer<'s> {
             next: None,
             window: None,
             overscan: [0; 2],
-            integrator: scene.render.integrator,
-            max_depth: scene.render.max_depth,
-            seed: scene.render.seed,
+            settings: scene.render.clone(),
             threads: 0,
             skips: SkipSet::ALL,
             certify: true,
@@ -227,21 +223,26 @@ impl<'s> Renderer<'s> {
         self
     }
 
-    /// How light is found.
-    pub fn integrator(mut self, integrator: Integrator) -> Self {
-        self.integrator = integrator;
+    /// Longest chain of rays, the camera ray being 1.
+    pub fn max_depth(mut self, depth: u32) -> Self {
+        self.settings.max_depth = depth;
         self
     }
 
-    /// Longest chain of rays, the camera ray being 1.
-    pub fn max_depth(mut self, depth: u32) -> Self {
-        self.max_depth = depth;
+    /// How radiance is found.
+    pub fn integrator(mut self, integrator: Integrator) -> Self {
+        self.settings.integrator = integrator;
         self
+    }
+
+    /// All settings of how radiance is found.
+    pub fn settings(&self) -> &RenderSettings {
+        &self.settings
     }
 
     /// Chooses the sample pattern.
     pub fn seed(mut self, seed: u64) -> Self {
-        self.seed = seed;
+        self.settings.seed = seed;
         self
     }
 
@@ -291,18 +292,17 @@ impl<'s> Renderer<'s> {
 
     /// The longest chain of rays in force.
     pub fn depth(&self) -> u32 {
-        self.max_depth
+        self.settings.max_depth
     }
 
     /// The seed in force.
     pub fn pattern(&self) -> u64 {
-        self.seed
+        self.settings.seed
     }
 
     /// A hash of the scene and of all settings that decide about colour: equal hashes, equal pixels. In hexadecimal.
     pub fn scene_hash(&self) -> String {
-        let is_reference = self.engine == Engine::Reference;
-        let settings = (self.image(), self.view(), self.integrator, self.depth(), self.pattern(), is_reference);
+        let settings = (self.image(), self.view(), self.settings(), self.engine == Engine::Reference);
         self.scene.hash(&format!("{settings:?}"))
     }
 
@@ -367,9 +367,10 @@ pub(crate) fn pool(threads: usize) -> Result<ThreadPool, RenderError> {
 pub struct Frame<'s> {
     plan: Plan<'s>,
     tree: Tree,
+    lamps: Lamps<'s>,
     rays: CameraRays,
     spp: u32,
-    max_depth: u32,
+    settings: RenderSettings,
     /// What depth is counted along; `None`: along each ray.
     axis: Option<DVec3>,
     plan_seconds: f64,
@@ -386,12 +387,14 @@ impl<'s> Frame<'s> {
         let plan_seconds = start.elapsed().as_secs_f64();
         let tree =
             Tree::new(parts, &plan.visible).certify(renderer.certify).one_by_one(renderer.engine == Engine::Single);
+        let lamps = Lamps::new(&plan, renderer.settings.integrator);
         let build_seconds = start.elapsed().as_secs_f64() - plan_seconds;
         let image = &renderer.image;
         let display = (image.width, image.height);
-        let rays = CameraRays::new(renderer.camera, plan.origin, display, image.filter, image.spp, renderer.seed);
-        let (spp, max_depth, axis) = (image.spp, renderer.max_depth, renderer.camera.view_axis());
-        Frame { plan, tree, rays, spp, max_depth, axis, plan_seconds, build_seconds }
+        let seed = renderer.settings.seed;
+        let rays = CameraRays::new(renderer.camera, plan.origin, display, image.filter, image.spp, seed);
+        let (settings, axis) = (renderer.settings.clone(), renderer.camera.view_axis());
+        Frame { plan, tree, lamps, rays, spp: image.spp, settings, axis, plan_seconds, build_seconds }
     }
 
     /// What the coordinates of its rays are relative to.
@@ -401,7 +404,7 @@ impl<'s> Frame<'s> {
 
     /// Whether rays go on from some material in use.
     pub fn scatters(&self) -> bool {
-        self.plan.scatters
+        self.plan.scatters || self.settings.integrator == Integrator::Path
     }
 
     /// Its blocks: windows that are traced as one, of some hundred pixels.
@@ -416,7 +419,7 @@ impl<'s> Frame<'s> {
     }
 
     fn direct(&self) -> Direct<'_> {
-        Direct::new(&self.plan, &self.tree, self.max_depth)
+        Direct::new(&self.plan, &self.tree, &self.lamps, self.settings.clone())
     }
 
     fn stats(&self, threads: usize, trace_seconds: f64) -> Stats {

@@ -10,7 +10,6 @@ use crate::film::{Picture, Window};
 use crate::integrate::{RayCounts, RayKind};
 use crate::plan::Kind;
 use crate::reference::{EventKind, Pixel, Reference, View};
-use crate::scene::RenderSettings;
 use crate::shapes::RowRef;
 
 /// A frame whose rows are its blocks. There are no columns, no tree and no tests to count; of the shadow rays it is
@@ -37,9 +36,7 @@ impl Rows {
     pub fn new(renderer: &Renderer, window: Window) -> Self {
         let start = Instant::now();
         let tracer = Reference::relative_to(renderer.scene, renderer.camera.eye);
-        let integrator = renderer.integrator;
-        let settings = RenderSettings { integrator, max_depth: renderer.max_depth, seed: renderer.seed };
-        let view = tracer.view(renderer.camera, &renderer.image, &settings);
+        let view = tracer.view(renderer.camera, &renderer.image, &renderer.settings);
         Rows { tracer, view, window, origin: renderer.camera.eye, plan_seconds: start.elapsed().as_secs_f64() }
     }
 
@@ -125,7 +122,9 @@ fn place(pixel: &Pixel, origin: DVec3) -> (DVec3, DVec2) {
 
 fn add(counts: &mut RayCounts, pixel: &Pixel) {
     let rays = pixel.rays;
-    for (kind, count) in RayKind::ALL.into_iter().zip([rays.camera, rays.shadow, rays.reflection, rays.refraction]) {
+    for (kind, count) in
+        RayKind::ALL.into_iter().zip([rays.camera, rays.shadow, rays.reflection, rays.refraction, rays.bounce])
+    {
         counts.rays[kind as usize] += count;
     }
     for event in pixel.events.iter().filter(|event| event.outcome >= 0) {
@@ -133,6 +132,7 @@ fn add(counts: &mut RayCounts, pixel: &Pixel) {
             EventKind::Camera => RayKind::Camera,
             EventKind::Reflection => RayKind::Reflection,
             EventKind::Refraction => RayKind::Refraction,
+            EventKind::Bounce => RayKind::Bounce,
             EventKind::Light(_) | EventKind::Texture(_) => continue,
         };
         counts.hits[kind as usize] += 1;

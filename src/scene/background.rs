@@ -2,15 +2,18 @@
 
 use glam::DVec3;
 
-use super::ImageTexture;
+use super::{ImageTexture, Sky};
 
 /// The background of a scene.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Background {
     /// What it shows.
     pub backdrop: Backdrop,
     /// A camera ray that misses has alpha 0 and adds nothing; secondary rays still see the backdrop.
     pub transparent: bool,
+    /// Whether a picture is a light too, in the direct integrator and for the paths' sampling of lights; without
+    /// it surfaces that scatter light get none from it.
+    pub light: bool,
 }
 
 /// Radiance by direction, linear Rec. 709.
@@ -35,6 +38,22 @@ pub enum Backdrop {
         /// Degrees, turns the picture about +y.
         rotation: f64,
     },
+}
+
+impl Default for Background {
+    fn default() -> Self {
+        Background { backdrop: Backdrop::default(), transparent: false, light: true }
+    }
+}
+
+impl Background {
+    /// The picture as a light, where it is one.
+    pub fn sky(&self) -> Option<Sky> {
+        match &self.backdrop {
+            Backdrop::Image { image, .. } if self.light => Sky::new(image),
+            Backdrop::Image { .. } | Backdrop::Color(_) | Backdrop::Gradient { .. } => None,
+        }
+    }
 }
 
 impl Default for Backdrop {

@@ -39,10 +39,13 @@ impl Write for Sum {
 impl Sum {
     fn scene(&mut self, scene: &Scene) {
         let Scene { image, render, cameras, background, ambient, textures, materials, lights, .. } = scene;
-        let Background { backdrop, transparent } = background;
+        let Background { backdrop, transparent, light } = background;
         let Scene { objects, clouds, groups, .. } = scene;
         self.small(&("octray scene 1", image, render, cameras, transparent, ambient, materials, lights, groups));
         self.backdrop(backdrop);
+        if !light {
+            self.small(&"no light");
+        }
         textures.iter().for_each(|texture| self.texture(texture));
         self.small(&objects.len());
         objects.iter().for_each(|object| self.object(object));

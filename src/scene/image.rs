@@ -22,11 +22,13 @@ pub struct RenderSettings {
     pub max_depth: u32,
     /// Chooses the sample pattern.
     pub seed: u64,
+    /// How far occluders count in ambient occlusion, scene units, > 0; may be infinite.
+    pub ao_distance: f64,
 }
 
 impl Default for RenderSettings {
     fn default() -> Self {
-        RenderSettings { integrator: Integrator::Direct, max_depth: 5, seed: 0 }
+        RenderSettings { integrator: Integrator::Direct, max_depth: 5, seed: 0, ao_distance: f64::INFINITY }
     }
 }
 
@@ -35,6 +37,13 @@ impl Default for RenderSettings {
 pub enum Integrator {
     /// Direct light with mirror reflection and refraction (Whitted).
     Direct,
+    /// Ambient occlusion: surfaces that scatter light show their albedo times the share of the hemisphere, weighed
+    /// with the cosine, where nothing is nearer than [`RenderSettings::ao_distance`]. Lights and
+    /// ambient light are left out; mirrors and glass are as in `Direct`.
+    Ao,
+    /// All light: direct light as in `Direct`, and what surfaces throw on each other. Of the ways on (scattered,
+    /// mirrored, refracted) each sample takes one.
+    Path,
 }
 
 /// A separable pixel filter, zero beyond its radius.

@@ -28,6 +28,8 @@ pub mod pattern;
 pub(crate) mod picture_file;
 pub mod rules;
 mod shape;
+mod sky;
+pub(crate) mod split;
 mod texture;
 mod toml;
 pub mod write;
@@ -46,11 +48,12 @@ pub(crate) use self::fit::bound as bounding_balls;
 pub use self::frames::Frames;
 pub use self::image::{Filter, FilterKind, FilterTable, ImageSettings, Integrator, RenderSettings};
 pub use self::layers::{Aov, Layers, UnknownAov};
-pub use self::light::{Falloff, Light, Source};
+pub use self::light::{Emitter, Falloff, Light, Patches, Source, frame};
 pub use self::material::{Material, Model, Paint, Visible};
 pub use self::motion::carried;
 pub use self::objects::Objects;
 pub use self::shape::{Cone, Cuboid, Cylinder, Disk, Plane, Polygon, Shape, Sphere, basis};
+pub use self::sky::Sky;
 pub use self::texture::{Checker, ColorSpace, ImageTexture, Texel, Texture, TextureFilter, TextureKind, Wrap};
 
 /// A whole scene: geometry, materials, lights, cameras and the settings of its picture.

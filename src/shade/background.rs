@@ -52,10 +52,27 @@ impl<'s> Backdrop8<'s> {
 const _: () = assert!(LANES == 8);
 
 fn look(image: &ImageTexture, dir: DVec3, rotation: f64) -> DVec3 {
-    let d = dir.normalize();
-    let (sin, cos) = (-rotation).sin_cos();
-    let turned = DVec3::new(cos * d.x + sin * d.z, d.y, cos * d.z - sin * d.x);
-    let u = 0.5 + turned.x.atan2(-turned.z) / TAU;
-    let v = turned.y.clamp(-1.0, 1.0).acos() / PI;
-    bilinear(image, DVec2::new(u, v), [Wrap::Repeat, Wrap::Clamp])
+    look_up(image, place(dir, rotation))
+}
+
+/// A lat-long picture by texture coordinates.
+pub(super) fn look_up(image: &ImageTexture, uv: DVec2) -> DVec3 {
+    bilinear(image, uv, [Wrap::Repeat, Wrap::Clamp])
+}
+
+/// Texture coordinates of a direction in a picture that is turned by `rotation` radians.
+pub(super) fn place(dir: DVec3, rotation: f64) -> DVec2 {
+    let d = about_y(dir.normalize(), -rotation);
+    DVec2::new(0.5 + d.x.atan2(-d.z) / TAU, d.y.clamp(-1.0, 1.0).acos() / PI)
+}
+
+/// The other way round: the unit direction of texture coordinates.
+pub(super) fn world_from_picture(uv: DVec2, rotation: f64) -> DVec3 {
+    let ((sin_a, cos_a), (sin_b, cos_b)) = ((TAU * (uv.x - 0.5)).sin_cos(), (PI * uv.y).sin_cos());
+    about_y(DVec3::new(sin_b * sin_a, cos_b, -sin_b * cos_a), rotation)
+}
+
+fn about_y(d: DVec3, angle: f64) -> DVec3 {
+    let (sin, cos) = angle.sin_cos();
+    DVec3::new(cos * d.x + sin * d.z, d.y, cos * d.z - sin * d.x)
 }

@@ -1,4 +1,4 @@
-//! Lights, eight points at a time.
+//! Lights without an area, eight points at a time.
 
 use glam::DVec3;
 
@@ -6,7 +6,7 @@ use crate::lanes::{Float8, Mask8, Vec3x8, float8};
 use crate::plan::Plan;
 use crate::scene::{Falloff, Source};
 
-/// All lights that are asked, in f32, relative to the plan's origin, each with its index in the scene.
+/// All lights without an area that are asked, in f32, relative to the plan's origin, each with its index in the scene.
 #[derive(Debug)]
 pub struct LightTable(Vec<(usize, Illumination)>);
 
@@ -42,7 +42,7 @@ struct Cone {
 impl LightTable {
     /// Rounds the plan's.
     pub fn new(plan: &Plan) -> Self {
-        let light = |light: &crate::scene::Light| {
+        let light = |(index, light): (usize, &crate::scene::Light)| {
             let over_pi = |color: DVec3| (color / std::f64::consts::PI).as_vec3().to_array();
             let place = |position: DVec3| Toward::Point((position - plan.origin).as_vec3().to_array());
             let (toward, strength, square, cone) = match light.source {
@@ -58,11 +58,12 @@ impl LightTable {
                     let (angle, penumbra) = (cone.to_radians() as f32, penumbra.to_radians() as f32);
                     (place(position), over_pi(intensity), true, Some(Cone { axis, angle, penumbra }))
                 }
+                Source::Area { .. } => return None,
             };
-            Illumination { toward, shadows: light.shadows, strength, square, cone }
+            Some((index, Illumination { toward, shadows: light.shadows, strength, square, cone }))
         };
         let asked = plan.scene.lights.iter().enumerate().filter(|(index, _)| plan.lights[*index]);
-        LightTable(asked.map(|(index, source)| (index, light(source))).collect())
+        LightTable(asked.filter_map(light).collect())
     }
 
     /// The lights in file order.

@@ -13,7 +13,7 @@ use glam::DVec3;
 
 use crate::integrate::{CameraRays, Samples8};
 use crate::lanes::{LANES, Ray, UNIT_ROUNDOFF};
-use crate::scene::{Camera, ImageSettings, Scene, Source, basis};
+use crate::scene::{Camera, Emitter, ImageSettings, Scene, Source, basis};
 use crate::tracer::Hit;
 
 /// Pixels along the edge of a tile.
@@ -73,8 +73,10 @@ pub fn eights(image: &ImageSettings) -> Vec<Eight> {
 
 /// A place that the shadow rays of a scene go to.
 pub fn light_position(scene: &Scene) -> Option<DVec3> {
-    scene.lights.iter().find_map(|light| match light.source {
-        Source::Point { position, .. } | Source::Spot { position, .. } => Some(position),
+    scene.lights.iter().find_map(|light| match &light.source {
+        Source::Point { position, .. } | Source::Spot { position, .. } => Some(*position),
+        Source::Area { emitter: Emitter::Sphere { center, .. } | Emitter::Disk { center, .. }, .. } => Some(*center),
+        Source::Area { emitter: Emitter::Polygon(polygon), .. } => polygon.corners.first().copied(),
         Source::Directional { .. } => None,
     })
 }

@@ -42,7 +42,7 @@ fn a_uniformly_lit_white_room() {
     let view = view(&tracer, &look(DVec3::new(1.5, 1.0, 3.0), DVec3::ZERO), 4, 5);
     for pixel in all_pixels(&tracer, &view) {
         assert!((pixel.rgba[0] - (2.5 / PI + 0.25)).abs() < 1e-14 && pixel.rgba[3] == 1.0, "{:?}", pixel.rgba);
-        assert_eq!(pixel.rays, RayCounts { camera: 4, shadow: 4, reflection: 0, refraction: 0 });
+        assert_eq!(pixel.rays, RayCounts { camera: 4, shadow: 4, reflection: 0, refraction: 0, bounce: 0 });
     }
 }
 
@@ -150,7 +150,7 @@ fn lights_and_shadows() {
     close(radiance(lamp(Falloff::None), true, there), 8.0 * 0.8, 1);
     close(radiance(point(DVec3::new(0.0, -4.0, 0.0), 8.0, Falloff::None), true, there), 0.0, 0);
     let sun = Source::Directional { direction: DVec3::new(0.0, -2.0, 0.0), irradiance: DVec3::splat(3.0) };
-    close(radiance(sun, true, here), 0.0, 1);
+    close(radiance(sun.clone(), true, here), 0.0, 1);
     close(radiance(sun, true, there), 3.0, 1);
     // The place is at atan(3/4) = 36.87 degrees from the axis.
     let spot = |cone, penumbra| {
@@ -184,7 +184,7 @@ fn phong_adds_its_terms() {
         let want = lit + 0.1 * 0.6 * color + 0.3 * sky + 0.2 * below;
         assert!((value - want).abs() < 1e-7, "{value} {want}");
     }
-    assert_eq!(pixel.rays, RayCounts { camera: 1, shadow: 1, reflection: 1, refraction: 1 });
+    assert_eq!(pixel.rays, RayCounts { camera: 1, shadow: 1, reflection: 1, refraction: 1, bounce: 0 });
     let mut events = pixel.events;
     events.sort();
     let told: Vec<_> = events.iter().map(|event| (event.path, event.kind, event.outcome)).collect();

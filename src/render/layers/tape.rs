@@ -134,6 +134,7 @@ impl Record for LayerTape<'_, '_> {
     fn ray(&mut self, _: RayKind, _: Ray, _: Option<u32>, _: f32, _: usize, _: u32) {}
     fn shadow(&mut self, _: usize, _: Ray, _: bool, _: usize, _: u32) {}
     fn lit(&mut self, _: usize, _: usize, _: u32) {}
+    fn seen(&mut self, _: usize, _: usize, _: u32) {}
     fn texture(&mut self, _: usize, _: i64, _: usize, _: u32) {}
 
     const SURFACES: bool = true;

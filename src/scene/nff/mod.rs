@@ -67,7 +67,7 @@ pub fn read(text: &str, path: &Path) -> Result<Scene, SceneErrors> {
         cameras: file.view.iter().map(camera).collect(),
         background: Background {
             backdrop: Backdrop::Color(file.background.unwrap_or(DVec3::ZERO)),
-            transparent: false,
+            ..Background::default()
         },
         ambient: DVec3::splat(usual),
         lights: file.lights.into_iter().map(light).collect(),

@@ -89,7 +89,7 @@ fn every_statement_arrives() {
 
     let usual = DVec3::splat(2f64.sqrt() / 4.0);
     assert_eq!(scene.ambient, usual);
-    let lights: Vec<_> = scene.lights.iter().map(|light| light.source).collect();
+    let lights: Vec<_> = scene.lights.iter().map(|light| light.source.clone()).collect();
     let light =
         |position, intensity| LightSource::Point { position, intensity: PI * intensity, falloff: Falloff::None };
     let colored = light(DVec3::new(4.0, 5.0, 6.0), DVec3::new(0.1, 0.2, 0.3));

@@ -45,7 +45,7 @@ pub(in crate::scene) fn read(
     let scene = Scene {
         image: Some(ImageSettings { width, height, spp, filter: Filter::default() }),
         cameras: vec![camera],
-        background: Background { backdrop: Backdrop::Color(DVec3::ONE), transparent: false },
+        background: Background { backdrop: Backdrop::Color(DVec3::ONE), ..Background::default() },
         ambient,
         lights,
         materials: vec![material("atoms"), material("bonds")],

@@ -26,6 +26,9 @@ const DEEPEST: u64 = 1000;
 const FILTERS: &[(&str, FilterKind)] =
     &[("gaussian", FilterKind::Gaussian), ("box", FilterKind::Box), ("blackman-harris", FilterKind::BlackmanHarris)];
 
+const INTEGRATORS: &[(&str, Integrator)] =
+    &[("direct", Integrator::Direct), ("ao", Integrator::Ao), ("path", Integrator::Path)];
+
 #[derive(Clone, Copy)]
 enum LensKind {
     Pinhole,
@@ -108,6 +111,7 @@ impl<'a> Reader<'a, '_> {
         let scale = table.maybe("scale", number(Rule::COLOR));
         let rotation = table.maybe("rotation", number(Rule::FINITE));
         let transparent = table.or("transparent", false, flag);
+        let light = table.maybe("light", flag);
         let lonely = if picture.as_ref().is_some_and(Option::is_none) { picture_only(&table) } else { None };
         let choices = (flat?, top?, bottom?, picture?, lonely);
         let backdrop = match choices {
@@ -138,13 +142,13 @@ impl<'a> Reader<'a, '_> {
             }
         };
         table.finish();
-        Some(Background { backdrop: backdrop?, transparent: transparent? })
+        Some(Background { backdrop: backdrop?, transparent: transparent?, light: light?.unwrap_or(true) })
     }
 }
 
 /// A key that means nothing without a picture.
 fn picture_only(table: &Table<'_>) -> Option<&'static str> {
-    ["scale", "rotation"].into_iter().find(|key| table.has(key))
+    ["scale", "rotation", "light"].into_iter().find(|key| table.has(key))
 }
 
 fn image(table: Table<'_>) -> Option<ImageSettings> {
@@ -191,14 +195,8 @@ fn layers(table: &Table<'_>) -> Option<Layers> {
 }
 
 fn render(table: Table<'_>) -> Option<RenderSettings> {
-    let integrator = table.or("integrator", Integrator::Direct, |item| {
-        if matches!(item.value.as_str(), Some("ao" | "path")) {
-            let rule = "the integrators \"ao\" and \"path\" are not in this version: use \"direct\"";
-            item.context.fail(&item.span, rule, "");
-            return None;
-        }
-        choice(&[("direct", Integrator::Direct)])(item)
-    });
+    let integrator = table.or("integrator", Integrator::Direct, choice(INTEGRATORS));
+    let ao_distance = table.or("ao_distance", f64::INFINITY, number(Rule::LENGTH));
     let max_depth = table.or("max_depth", 5, whole(1, DEEPEST));
     let seed = table.or("seed", 0, whole(0, u64::MAX));
     if let Some(item) = table.item("noise") {
@@ -206,7 +204,12 @@ fn render(table: Table<'_>) -> Option<RenderSettings> {
         item.context.fail(&item.span, rule, "");
     }
     table.finish();
-    Some(RenderSettings { integrator: integrator?, max_depth: max_depth? as u32, seed: seed? })
+    Some(RenderSettings {
+        integrator: integrator?,
+        max_depth: max_depth? as u32,
+        seed: seed?,
+        ao_distance: ao_distance?,
+    })
 }
 
 /// What is left to do for a camera when all of the scene is known.

@@ -7,8 +7,9 @@ use glam::DVec3;
 
 use super::text::{Table, keys, list, number, path, quoted, vector};
 use crate::scene::{
-    Backdrop, Background, Camera, ColorSpace, Falloff, FilterKind, ImageSettings, Integrator, Layers, Lens, Light,
-    Material, Model, Paint, Part, RenderSettings, Scene, Source, Texture, TextureFilter, TextureKind, Visible, Wrap,
+    Backdrop, Background, Camera, ColorSpace, Emitter, Falloff, FilterKind, ImageSettings, Integrator, Layers, Lens,
+    Light, Material, Model, Paint, Part, RenderSettings, Scene, Source, Texture, TextureFilter, TextureKind, Visible,
+    Wrap,
 };
 
 /// Adds the tables of everything but shapes and clouds.
@@ -62,11 +63,15 @@ fn image(image: &ImageSettings, layers: Layers) -> Table {
 fn render(render: &RenderSettings) -> Table {
     let integrator = match render.integrator {
         Integrator::Direct => "direct",
+        Integrator::Ao => "ao",
+        Integrator::Path => "path",
     };
+    let distance = Some(render.ao_distance).filter(|distance| distance.is_finite());
     Table::new("render")
         .set("integrator", quoted(integrator))
         .set("max_depth", render.max_depth)
         .set("seed", render.seed)
+        .set_some("ao_distance", distance.map(number))
 }
 
 fn camera(scene: &Scene, index: usize, camera: &Camera) -> Table {
@@ -99,7 +104,9 @@ fn background(background: &Background, animated: bool, file: &Path) -> io::Resul
         Backdrop::Color(color) => table.set("color", vector(*color)),
         Backdrop::Gradient { top, bottom } => table.set("top", vector(*top)).set("bottom", vector(*bottom)),
         Backdrop::Image { image, scale, rotation } => {
-            table.set("image", path(&image.file, file)?).set("scale", number(*scale)).set("rotation", number(*rotation))
+            let table = table.set("image", path(&image.file, file)?);
+            let table = table.set("scale", number(*scale)).set("rotation", number(*rotation));
+            if background.light { table } else { table.set("light", false) }
         }
     };
     Ok(Some(if background.transparent { table.set("transparent", true) } else { table }))
@@ -166,8 +173,8 @@ fn material(scene: &Scene, material: &Material) -> Table {
 
 fn light(light: &Light) -> Table {
     let table = Table::one_of("lights").set_some("name", light.name.as_deref().map(quoted));
-    let table = match light.source {
-        Source::Point { position, intensity, falloff } => {
+    let table = match &light.source {
+        &Source::Point { position, intensity, falloff } => {
             let falloff = match falloff {
                 Falloff::InverseSquare => "inverse-square",
                 Falloff::None => "none",
@@ -178,17 +185,37 @@ fn light(light: &Light) -> Table {
                 .set("intensity", vector(intensity))
                 .set("falloff", quoted(falloff))
         }
-        Source::Directional { direction, irradiance } => table
+        &Source::Directional { direction, irradiance } => table
             .set("type", quoted("directional"))
             .set("direction", vector(direction))
             .set("irradiance", vector(irradiance)),
-        Source::Spot { position, direction, intensity, cone, penumbra } => table
+        &Source::Spot { position, direction, intensity, cone, penumbra } => table
             .set("type", quoted("spot"))
             .set("position", vector(position))
             .set("direction", vector(direction))
             .set("intensity", vector(intensity))
             .set("cone", number(cone))
             .set("penumbra", number(penumbra)),
+        Source::Area { emitter, radiance, visible } => {
+            let table = emission(table, emitter).set("radiance", vector(*radiance));
+            if *visible { table } else { table.set("visible", false) }
+        }
     };
     if light.shadows { table } else { table.set("shadows", false) }
+}
+
+fn emission(table: Table, emitter: &Emitter) -> Table {
+    match emitter {
+        Emitter::Sphere { center, radius } => {
+            table.set("type", quoted("sphere")).set("center", vector(*center)).set("radius", number(*radius))
+        }
+        Emitter::Disk { center, normal, radius } => table
+            .set("type", quoted("disk"))
+            .set("center", vector(*center))
+            .set("normal", vector(*normal))
+            .set("radius", number(*radius)),
+        Emitter::Polygon(polygon) => {
+            table.set("type", quoted("polygon")).set("corners", list(polygon.corners.iter().copied().map(vector)))
+        }
+    }
 }

@@ -8,8 +8,9 @@ use glam::{DQuat, DVec2, DVec3};
 use super::*;
 use crate::scene::{
     Backdrop, Background, Camera, Checker, Cloud, CloudMaterial, CloudShapes, ColorSpace, Cone, Cuboid, Cylinder, Disk,
-    Falloff, Filter, FilterKind, ImageSettings, ImageTexture, Lens, Light, Material, Model, Object, Paint, Plane,
-    Polygon, RenderSettings, Rows, Shape, Source, Sphere, Texture, TextureFilter, TextureKind, Visible, Wrap, nff,
+    Emitter, Falloff, Filter, FilterKind, ImageSettings, ImageTexture, Integrator, Lens, Light, Material, Model,
+    Object, Paint, Plane, Polygon, RenderSettings, Rows, Shape, Source, Sphere, Texture, TextureFilter, TextureKind,
+    Visible, Wrap, nff,
 };
 
 /// Numbers whose digits are many.
@@ -58,12 +59,21 @@ fn materials() -> Vec<Material> {
 }
 
 fn lights() -> Vec<Light> {
+    let corners = vec![DVec3::ZERO, DVec3::X * THIRD, DVec3::new(THIRD, 0.7, 0.0), DVec3::Y * 0.7];
+    let lamp = Polygon { corners, ..Polygon::default() };
     let (position, direction, intensity) = (ODD, DVec3::new(0.0, -3.0, THIRD), DVec3::new(1e4, THIRD, 0.0));
     let sources = [
         Source::Point { position, intensity, falloff: Falloff::None },
         Source::Point { position, intensity, falloff: Falloff::InverseSquare },
         Source::Directional { direction, irradiance: intensity },
         Source::Spot { position, direction, intensity, cone: 90.0 * THIRD, penumbra: 0.1 },
+        Source::Area { emitter: Emitter::Sphere { center: ODD, radius: THIRD }, radiance: intensity, visible: true },
+        Source::Area {
+            emitter: Emitter::Disk { center: ODD, normal: direction, radius: THIRD },
+            radiance: intensity,
+            visible: false,
+        },
+        Source::Area { emitter: Emitter::Polygon(lamp), radiance: intensity, visible: true },
     ];
     let light = |source| Light { name: None, shadows: true, source };
     let mut lights: Vec<_> = sources.map(light).into();
@@ -117,7 +127,7 @@ fn everything(picture: &Path) -> Scene {
             spp: 7,
             filter: Filter { kind: FilterKind::BlackmanHarris, radius: 2.0 + THIRD },
         }),
-        render: RenderSettings { max_depth: 9, seed: 1 << 62, ..RenderSettings::default() },
+        render: RenderSettings { integrator: Integrator::Ao, max_depth: 9, seed: 1 << 62, ao_distance: 100.0 * THIRD },
         cameras: vec![
             camera("front", Lens::Pinhole { vfov: 100.0 * THIRD }),
             camera("top", Lens::Orthographic { height: THIRD }),
@@ -127,6 +137,7 @@ fn everything(picture: &Path) -> Scene {
         background: Background {
             backdrop: Backdrop::Gradient { top: ODD.abs(), bottom: DVec3::ONE },
             transparent: true,
+            light: true,
         },
         ambient: DVec3::splat(THIRD),
         textures: vec![

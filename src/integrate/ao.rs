@@ -1,0 +1,36 @@
+//! Ambient occlusion: how open each place is.
+
+use super::direct::{Direct, Sink};
+use super::lamps::pairs;
+use super::lights::Hits;
+use super::record::Record;
+use super::wave::Wave;
+use crate::accel::PACKETS;
+use crate::lanes::{Float8, Mask8, RayPacket, Vec3x8, bits, float8};
+use crate::sample::dimension;
+use crate::shade::scattered;
+
+impl Direct<'_> {
+    /// Adds the albedo where a scattered ray meets nothing near. As a light it has the number of the sky.
+    pub(super) fn add_openness<R: Record>(&self, wave: &Wave, hits: Hits, sink: &mut Sink<R>) {
+        let t_max = float8(self.settings.ao_distance as f32);
+        let mut lit = [0; PACKETS];
+        let mut radiance = [Vec3x8::ZERO; PACKETS];
+        sink.shadows.renew(None);
+        sink.shadows.packets.fill(RayPacket::dead());
+        for p in bits(hits.1) {
+            let shaded = &hits.0[p];
+            let dir = scattered(shaded.n_s, pairs(wave, p, dimension::SCATTER, sink.seeds));
+            let zero = Float8::ZERO;
+            let above = Mask8::gt(shaded.n_s.dot(dir), zero) & Mask8::gt(shaded.n_g.dot(dir), zero);
+            let facing = above & Mask8::gt(shaded.bsdf.lit, zero);
+            let albedo = shaded.bsdf.color * (shaded.bsdf.diffuse * shaded.softened(dir));
+            (radiance[p], lit[p]) = (wave.weighted(p, albedo), facing.bits() & shaded.hit);
+            let (origin, live) = (shaded.leave(true, shaded.error), Mask8::from_bits(lit[p]));
+            sink.shadows.packets[p] = RayPacket::new(origin, dir, t_max, live);
+        }
+        let cast = lit;
+        self.settle(self.plan.scene.lights.len(), wave, hits.1, (&cast, &mut lit), sink);
+        sink.add(hits.1, &radiance, &lit);
+    }
+}
