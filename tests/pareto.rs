@@ -15,14 +15,15 @@ fn pareto_writes_a_page_plots_and_a_table() {
     assert!(out.contains("scene: the front (against ") && err.contains("scene: packet, 1 spp: "), "{out}{err}");
     let text = |name: &str| fs::read_to_string(room.path("pareto").join(name)).unwrap();
     let table = text("points.csv");
-    let columns = "scene,series,engine,filter,triangles_per_sphere,spp,seconds,rmse,rel_mse,max,front";
+    let columns =
+        "scene,series,engine,certified,filter,triangles_per_sphere,spp,seconds,wall_seconds,rmse,rel_mse,max,front";
     assert_eq!(table.lines().next(), Some(columns));
     for row in table.lines().skip(1) {
         let cells: Vec<&str> = row.split(',').collect();
-        assert_eq!(cells.len(), 11, "{row}");
-        assert!(cells[6..10].iter().all(|cell| cell.parse::<f64>().is_ok_and(|x| x >= 0.0)), "{row}");
+        assert_eq!(cells.len(), 13, "{row}");
+        assert!(cells[7..12].iter().all(|cell| cell.parse::<f64>().is_ok_and(|x| x >= 0.0)), "{row}");
     }
-    assert!(table.contains(",spheres as 968 triangles,packet,gaussian,968,1,"), "{table}");
+    assert!(table.contains(",spheres as 968 triangles,packet,true,gaussian,968,1,"), "{table}");
     assert!(table.lines().any(|row| row.ends_with(",true")));
     for name in ["scene.rmse.svg", "scene.rel_mse.svg", "scene.max.svg", "scene-2.rmse.svg"] {
         assert!(text(name).starts_with("<svg"), "{name}");

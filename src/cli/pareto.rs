@@ -22,7 +22,7 @@ Examples:
     after_help = EXAMPLES,
     long_about = "Measure run time against error\n\n\
         Each scene is rendered in many ways: with 1, 2, 4, ... samples per pixel, by packets, by single rays and by the f64 \
-        reference, with other filters, and with its spheres cut into about 1,000 and 10,000 triangles. Seconds, RMSE, \
+        reference, without certification, with other filters, and with its spheres cut into about 1,000 and 10,000 triangles. CPU and wall seconds, RMSE, \
         relative MSE and the largest error, all against a converged picture, go to a CSV file, to plots, and to one page \
         for a browser that needs no other file. The front is marked: what nothing else beats in both time and error."
 )]
@@ -90,7 +90,7 @@ fn fronts(sweeps: &[Sweep]) -> String {
         text += &format!("{}: the front (against {} spp)\n", sweep.name, sweep.converged_spp);
         text += &format!(
             "{:<28} {:>6} {:>10} {:>10} {:>10} {:>10}\n",
-            "how", "spp", "seconds", "RMSE", "rel. MSE", "largest"
+            "how", "spp", "CPU s", "RMSE", "rel. MSE", "largest"
         );
         let mut front: Vec<&Point> = sweep.points.iter().filter(|point| point.front).collect();
         front.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));

@@ -131,7 +131,7 @@ impl Chart {
         }
         chart
             .configure_series_labels()
-            .position(SeriesLabelPosition::UpperRight)
+            .position(SeriesLabelPosition::LowerLeft)
             .background_style(WHITE.mix(0.85))
             .border_style(RGBColor(200, 200, 200))
             .label_font((FONT, 13).into_font().into_text_style(&root).pos(Pos::new(HPos::Left, VPos::Top)))
@@ -139,11 +139,12 @@ impl Chart {
         root.present()
     }
 
-    /// From somewhat below the least value to somewhat above the greatest.
+    /// The decades that hold all values, so that every axis has at least two labels.
     fn range(&self, axis: fn((f64, f64)) -> f64) -> [f64; 2] {
         let values = || self.series.iter().flat_map(|series| series.drawn().map(axis));
         let (least, most) = (values().fold(f64::INFINITY, f64::min), values().fold(0.0, f64::max));
-        if least > most { [0.1, 10.0] } else { [least / 1.5, most * 1.5] }
+        let decade = |value: f64, up: f64| 10f64.powf((value.log10() * up).floor() * up);
+        if least > most { [0.1, 10.0] } else { [decade(least / 1.01, 1.0), decade(most * 1.01, -1.0)] }
     }
 }
 

@@ -11,17 +11,21 @@ use crate::output::{Description, png};
 
 /// All points as CSV with a header.
 pub fn csv(sweeps: &[Sweep]) -> String {
-    let mut table = "scene,series,engine,filter,triangles_per_sphere,spp,seconds,rmse,rel_mse,max,front\n".to_owned();
+    let mut table =
+        "scene,series,engine,certified,filter,triangles_per_sphere,spp,seconds,wall_seconds,rmse,rel_mse,max,front\n"
+            .to_owned();
     for sweep in sweeps {
         let name = quoted(&sweep.name);
         for point in &sweep.points {
-            let Point { series, engine, filter, triangles, spp, seconds, rmse, rel_mse, max, front } = point;
+            let Point { series, engine, certified, filter, triangles, spp, .. } = point;
+            let Point { seconds, wall_seconds, rmse, rel_mse, max, front, .. } = point;
             let (engine, filter) = (engine_name(*engine), filter_name(*filter));
             let triangles = triangles.map_or(String::new(), |count| count.to_string());
             // Writing to a string cannot fail.
             let _ = writeln!(
                 table,
-                "{name},{series},{engine},{filter},{triangles},{spp},{seconds:e},{rmse:e},{rel_mse:e},{max:e},{front}"
+                "{name},{series},{engine},{certified},{filter},{triangles},{spp},{seconds:e},{wall_seconds:e},{rmse:e},{rel_mse:e},\
+                 {max:e},{front}"
             );
         }
     }
@@ -36,7 +40,7 @@ fn quoted(text: &str) -> String {
 impl Sweep {
     /// A plot of one error against time.
     pub fn chart(&self, title: &str, error: fn(&Point) -> f64) -> Chart {
-        let mut chart = Chart::new(title, "seconds (plan, tree, tracing)", "error");
+        let mut chart = Chart::new(title, "CPU seconds (plan, tree, tracing)", "error");
         for name in self.series() {
             let points = self.points.iter().filter(|point| point.series == name);
             chart.series.push(Series::line(name, points.map(|point| (point.seconds, error(point))).collect()));
@@ -89,9 +93,9 @@ const NOTES: &str = "<h2>How it was measured</h2><ul>\
 <li>RMSE and largest error are of linear values, relative MSE is the mean of (a - b)<sup>2</sup> / (b<sup>2</sup> + 0.01).</li>\
 <li>The converged picture was made by the packet engine with another seed, so it shares no sample with what it judges. Other \
 filters are another picture, so they have a converged one of their own.</li>\
-<li>Seconds are wall time of planning, building the tree and tracing, the best of up to three; reading and writing files \
-are not in it.</li>\
-<li>Single rays draw the same bits as packets: the same errors, later. The f64 reference is brute force.</li>\
+<li>Seconds are CPU time of all threads for planning, building the tree and tracing, the best of up to three; reading and \
+writing files are not in it. The CSV file has wall time as well.</li>\
+<li>Not certified: what f32 leaves open is not decided in f64. Single rays draw the same bits as packets: the same errors, later. The f64 reference is brute force.</li>\
 <li>Spheres as triangles carry the sphere's normals at their corners; their errors end where the shape itself is wrong.</li>\
 </ul></html>\n";
 
@@ -100,7 +104,7 @@ fn section(sweep: &Sweep) -> String {
     let mut text = format!("<h2>{}</h2><div class=\"top\">{}<div><p>", escaped(&sweep.name), thumbnail(sweep));
     let _ = write!(
         text,
-        "{} x {} pixels, {} threads. The converged picture has {} samples per pixel and took {:.1} s.",
+        "{} x {} pixels, threads: {}. The converged picture has {} samples per pixel and took {:.1} s.",
         window.width(),
         window.height(),
         sweep.threads,
@@ -133,7 +137,7 @@ fn section(sweep: &Sweep) -> String {
 fn table<'a>(points: impl Iterator<Item = &'a Point>) -> String {
     let mut points: Vec<&Point> = points.collect();
     points.sort_by(|a, b| a.seconds.total_cmp(&b.seconds));
-    let head = "<table><tr><th>how</th><th>samples per pixel</th><th>seconds</th><th>RMSE</th><th>relative MSE</th>\
+    let head = "<table><tr><th>how</th><th>samples per pixel</th><th>CPU seconds</th><th>RMSE</th><th>relative MSE</th>\
         <th>largest</th></tr>";
     let row = |point: &&Point| {
         let Point { series, spp, seconds, rmse, rel_mse, max, front, .. } = point;
