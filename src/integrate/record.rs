@@ -137,6 +137,10 @@ pub struct Taken<'a> {
     pub pixels: &'a [[u32; LANES]],
     /// Squares of their distances from the centres of their pixels, pixels.
     pub distances: &'a [[f64; LANES]; PACKETS],
+    /// Tests done for them, but for what goes on from them.
+    pub tests: Counts,
+    /// Rays traced for them, and packets.
+    pub rays: RayCounts,
 }
 
 /// Samples of some tiles and what came of them.
@@ -148,9 +152,9 @@ pub struct Summed<'a> {
     pub pixels: &'a [[u32; LANES]],
     /// Radiance and alpha.
     pub samples: &'a Samples,
-    /// Tests done for them.
+    /// Tests done for what goes on from them.
     pub tests: Counts,
-    /// Rays traced for them, and packets.
+    /// Rays traced of that, and packets.
     pub rays: RayCounts,
 }
 

@@ -163,8 +163,16 @@ impl<R: Record> Work<'_, '_, R> {
         }
         self.direct.trace_camera(&mut self.room, self.record);
         if R::SURFACES {
+            let (tests, rays) = self.news();
             let Batch { samples, count, pixels, traced, distances } = &*batch;
-            self.record.taken(&Taken { count: *count, samples, pixels: &pixels[traced / LANES..], distances });
+            self.record.taken(&Taken {
+                count: *count,
+                samples,
+                pixels: &pixels[traced / LANES..],
+                distances,
+                tests,
+                rays,
+            });
         }
         self.tiles += 1;
         self.background_tiles += u64::from(self.room.rays.hits[RayKind::Camera as usize] == met);
@@ -175,6 +183,13 @@ impl<R: Record> Work<'_, '_, R> {
         }
     }
 
+    /// Tests and rays since the last time that this was asked.
+    fn news(&mut self) -> (Counts, RayCounts) {
+        let now = (self.room.walk.counts, self.room.rays);
+        let before = std::mem::replace(&mut self.before, now);
+        (now.0.since(&before.0), now.1.since(&before.1))
+    }
+
     /// Traces what goes on and adds the samples to their pixels.
     fn finish(&mut self, batch: &mut Batch) {
         if self.direct.goes_on() {
@@ -182,11 +197,9 @@ impl<R: Record> Work<'_, '_, R> {
         }
         batch.add_to(&self.room.samples, &mut self.sums);
         if R::SURFACES {
-            let (now, before) = ((self.room.walk.counts, self.room.rays), self.before);
-            let (tests, rays) = (now.0.since(&before.0), now.1.since(&before.1));
+            let (tests, rays) = self.news();
             let (count, pixels, samples) = (batch.traced, &batch.pixels[..], &self.room.samples);
             self.record.summed(&Summed { count, pixels, samples, tests, rays });
-            self.before = now;
         }
         self.room.begin();
         (batch.traced, batch.count) = (0, 0);

@@ -5,9 +5,9 @@ use glam::{DVec2, DVec3};
 use super::LayerPlan;
 use super::near::Near;
 use super::sums::{LayerWork, Sums};
-use crate::accel::PACKETS;
+use crate::accel::{Counts, PACKETS};
 use crate::film::Window;
-use crate::integrate::{RayKind, Record, Samples8, Seen, Silent, Summed, Taken};
+use crate::integrate::{RayCounts, RayKind, Record, Samples8, Seen, Silent, Summed, Taken};
 use crate::lanes::{Float8, LANES, Mask8, Ray, Vec3x8};
 use crate::plan::Owner;
 use crate::render::Frame;
@@ -115,13 +115,16 @@ impl<'a, 's> LayerTape<'a, 's> {
         }
     }
 
-    /// Spreads what some tiles cost over their samples.
-    fn add_cost(&mut self, summed: &Summed) {
-        let share = 1.0 / summed.count as f64;
+    /// Spreads what some samples cost over their pixels.
+    fn add_cost(&mut self, (count, pixels): (usize, &[[u32; LANES]]), tests: &Counts, rays: &RayCounts) {
+        if !self.plan.layers.has(Aov::Cost) || count == 0 {
+            return;
+        }
+        let share = 1.0 / count as f64;
         let all = |counts: &[u64]| counts.iter().sum::<u64>() as f64 * share;
-        let (boxes, lanes) = (summed.tests.boxes as f64 * share, all(&summed.rays.packets) * LANES as f64);
-        let cost = [boxes, all(&summed.tests.kinds), all(&summed.rays.rays), lanes];
-        for pixel in summed.pixels.iter().flatten().take(summed.count) {
+        let (boxes, lanes) = (tests.boxes as f64 * share, all(&rays.packets) * LANES as f64);
+        let cost = [boxes, all(&tests.kinds), all(&rays.rays), lanes];
+        for pixel in pixels.iter().flatten().take(count) {
             let sum = &mut self.sums.cost[*pixel as usize];
             *sum = std::array::from_fn(|k| sum[k] + cost[k]);
         }
@@ -171,6 +174,7 @@ impl Record for LayerTape<'_, '_> {
                 self.add_to_mattes(p, pixels);
             }
         }
+        self.add_cost((taken.count, taken.pixels), &taken.tests, &taken.rays);
         self.tile.hit = [0; PACKETS];
     }
 
@@ -178,9 +182,7 @@ impl Record for LayerTape<'_, '_> {
         if self.sums.want_variance() {
             self.add_radiance(summed);
         }
-        if self.plan.layers.has(Aov::Cost) && summed.count > 0 {
-            self.add_cost(summed);
-        }
+        self.add_cost((summed.count, summed.pixels), &summed.tests, &summed.rays);
     }
 }
 
