@@ -7,6 +7,7 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
+use rayon::prelude::*;
 
 use super::Tree;
 use super::node::{Child, Leaf, Node};
@@ -18,9 +19,11 @@ use crate::shapes::{Groups, Part, Stores};
 /// Most rows of a leaf.
 const MOST_ROWS: u32 = 8;
 /// Cost of a row in a leaf where that of a binary node, and of opening a leaf, is 1, for the surface area heuristic.
-/// Rows share a block and a kernel call, so eight of them cost a single ray what one does and a packet not much more
-/// than the cache lines that it fetches: full leaves are what keeps a large scene in the caches.
-const ROW_COST: f32 = 0.125;
+/// Rows share a block and a kernel call, so eight of them cost a single ray what one does, and full leaves are what
+/// keeps a large scene in the caches; a packet tests them one by one.
+const ROW_COST: f32 = 0.25;
+/// The same for a sphere, which is the cheapest to test.
+const SPHERE_COST: f32 = 0.125;
 
 /// A part with bounds, and its bounds.
 struct Item {
@@ -48,6 +51,7 @@ impl Tree {
             size = (bounds.max - bounds.min).max_element();
             let mut wide = Widen::new(&binary, &items);
             wide.build();
+            wide.nodes.shrink_to_fit();
             (nodes, depth) = (wide.nodes, wide.depth);
             parts = reorder(parts, &wide.order);
             groups = Some(wide.groups);
@@ -79,7 +83,7 @@ fn add<P: Part>(items: &mut Vec<Item>, kind: Kind, parts: &[P]) {
         let (min, max) = part.bounds();
         Item { kind, index: index as u32, aabb: outward(min, max) }
     };
-    items.extend(parts.iter().enumerate().map(item));
+    items.par_extend(parts.par_iter().enumerate().map(item));
 }
 
 /// Bounds in f32 that hold the exact part and the rounded one: 4 roundings of the larger coordinate out.
@@ -133,10 +137,11 @@ impl<'a> Widen<'a> {
     /// Fills the nodes level by level from the root.
     fn build(&mut self) {
         self.nodes.push(Node::empty());
-        let mut waiting = vec![(0, 0, 1)];
+        let mut waiting: Vec<(usize, u32, usize)> = vec![(0, 0, 1)];
         while let Some((wide, binary, depth)) = waiting.pop() {
             self.depth = self.depth.max(depth);
-            for (slot, child) in self.eight_below(binary).into_iter().enumerate() {
+            let (open, count) = self.eight_below(binary);
+            for (slot, child) in open.into_iter().take(count).enumerate() {
                 let aabb = *self.binary.nodes[child as usize].aabb();
                 let content = if self.leaf[child as usize] > 0 {
                     self.add_leaf(child)
@@ -150,35 +155,42 @@ impl<'a> Widen<'a> {
         }
     }
 
-    /// Opens the largest node again and again until there are eight children.
-    fn eight_below(&self, root: u32) -> Vec<u32> {
-        let mut open = vec![root];
-        while open.len() < LANES {
-            let area = |child: &u32| self.binary.nodes[*child as usize].aabb().half_area();
-            let inner = (0..open.len()).filter(|i| self.leaf[open[*i] as usize] == 0);
-            let Some(largest) = inner.max_by(|a, b| area(&open[*a]).total_cmp(&area(&open[*b]))) else { break };
+    /// Opens the largest node again and again until there are eight children, or as many as there can be.
+    fn eight_below(&self, root: u32) -> ([u32; LANES], usize) {
+        let area = |child: u32| match self.leaf[child as usize] {
+            0 => self.binary.nodes[child as usize].aabb().half_area(),
+            _ => f32::NEG_INFINITY,
+        };
+        let (mut open, mut areas, mut count) = ([root; LANES], [area(root); LANES], 1);
+        while count < LANES {
+            let largest = (0..count).max_by(|a, b| areas[*a].total_cmp(&areas[*b])).unwrap_or(0);
+            if self.leaf[open[largest] as usize] != 0 {
+                break;
+            }
             let first = self.binary.nodes[open[largest] as usize].first_index;
-            open[largest] = first;
-            open.push(first + 1);
+            (open[largest], open[count]) = (first, first + 1);
+            (areas[largest], areas[count]) = (area(first), area(first + 1));
+            count += 1;
         }
-        open
+        (open, count)
     }
 
     fn add_leaf(&mut self, root: u32) -> Child {
-        let mut below = vec![root];
-        let mut rows: Vec<&Item> = Vec::new();
+        let (mut below, mut kind, mut count) = (vec![root], Kind::Sphere, 0);
         while let Some(index) = below.pop() {
             let node = &self.binary.nodes[index as usize];
-            match node.prim_count {
-                0 => below.extend([node.first_index, node.first_index + 1]),
-                count => {
-                    let range = node.first_index as usize..(node.first_index + count) as usize;
-                    rows.extend(self.binary.primitive_indices[range].iter().map(|i| &self.items[*i as usize]));
-                }
+            if node.prim_count == 0 {
+                below.extend([node.first_index, node.first_index + 1]);
+                continue;
+            }
+            let range = node.first_index as usize..(node.first_index + node.prim_count) as usize;
+            for item in &self.binary.primitive_indices[range] {
+                let item = &self.items[*item as usize];
+                kind = item.kind;
+                count += 1;
+                self.order[kind as usize].push(item.index);
             }
         }
-        let (kind, count) = (rows[0].kind, rows.len());
-        self.order[kind as usize].extend(rows.iter().map(|item| item.index));
         let groups = &mut self.groups[kind as usize];
         groups.push(count as u8);
         Child::leaf(Leaf { kind, block: groups.len() - 1, count })
@@ -203,7 +215,7 @@ fn choose_leaves(binary: &Bvh2, items: &[Item]) -> Vec<u32> {
         let area = node.aabb().half_area();
         if node.prim_count > 0 {
             let kind = Some(items[binary.primitive_indices[node.first_index as usize] as usize].kind);
-            below[index] = Below { count: node.prim_count, kind, cost: area * leaf_cost(node.prim_count) };
+            below[index] = Below { count: node.prim_count, kind, cost: area * leaf_cost(kind, node.prim_count) };
             leaf[index] = node.prim_count;
             continue;
         }
@@ -212,7 +224,7 @@ fn choose_leaves(binary: &Bvh2, items: &[Item]) -> Vec<u32> {
         let split = a.cost + b.cost + area;
         let kind = a.kind.filter(|_| a.kind == b.kind);
         let count = a.count.saturating_add(b.count);
-        let whole = area * leaf_cost(count);
+        let whole = area * leaf_cost(kind, count);
         let fits = kind.is_some() && count <= MOST_ROWS && whole <= split;
         let kind = kind.filter(|_| fits);
         below[index] = Below { count, kind, cost: if fits { whole } else { split } };
@@ -221,8 +233,9 @@ fn choose_leaves(binary: &Bvh2, items: &[Item]) -> Vec<u32> {
     leaf
 }
 
-fn leaf_cost(rows: u32) -> f32 {
-    1.0 + ROW_COST * rows as f32
+fn leaf_cost(kind: Option<Kind>, rows: u32) -> f32 {
+    let row = if kind == Some(Kind::Sphere) { SPHERE_COST } else { ROW_COST };
+    1.0 + row * rows as f32
 }
 
 /// What lies below a binary node.
@@ -235,8 +248,8 @@ struct Below {
 }
 
 fn reorder(parts: Parts, order: &[Vec<u32>]) -> Parts {
-    fn pick<P: Clone>(parts: Vec<P>, order: &[Vec<u32>], kind: Kind) -> Vec<P> {
-        order[kind as usize].iter().map(|i| parts[*i as usize].clone()).collect()
+    fn pick<P: Part>(parts: Vec<P>, order: &[Vec<u32>], kind: Kind) -> Vec<P> {
+        order[kind as usize].par_iter().map(|i| parts[*i as usize].clone()).collect()
     }
     Parts {
         spheres: pick(parts.spheres, order, Kind::Sphere),
