@@ -120,7 +120,7 @@ impl<'s> Tracer<'s> {
     pub fn closest_hits(&self, rays: &[Ray]) -> Vec<Option<Hit>> {
         let batch = RayBatch::new(rays);
         let mut found = vec![Found::default(); batch.tiles()];
-        self.find_closest(&batch, 0, &mut found);
+        self.find_closest(&batch, 0, &mut found, &mut Room::default());
         let mut hits = (0..batch.tiles()).flat_map(|i| self.hits(&batch, i, &found[i])).collect::<Vec<_>>();
         hits.truncate(rays.len());
         hits
@@ -130,15 +130,15 @@ impl<'s> Tracer<'s> {
     pub fn occluded(&self, rays: &[Ray]) -> Vec<bool> {
         let batch = RayBatch::new(rays);
         let mut dark = vec![0; batch.tiles()];
-        self.find_occluded(&batch, 0, &mut dark);
+        self.find_occluded(&batch, 0, &mut dark, &mut Room::default());
         (0..rays.len()).map(|i| dark[i / TILE] >> (i % TILE) & 1 == 1).collect()
     }
 
     /// What the rays of some tiles of a batch meet first, from tile `first` on, and the tests that took.
-    pub fn find_closest(&self, batch: &RayBatch, first: usize, found: &mut [Found]) -> Counts {
-        let mut tiles = vec![Tile::empty(); found.len()];
-        batch.unpack(first, &mut tiles);
-        self.find(&mut tiles, found)
+    pub fn find_closest(&self, batch: &RayBatch, first: usize, found: &mut [Found], room: &mut Room) -> Counts {
+        room.tiles.resize(found.len(), Tile::empty());
+        batch.unpack(first, &mut room.tiles);
+        self.find(room, found)
     }
 
     /// The same for rays that are made where they are traced: `packet(k, p)` is packet `p` of tile `k`.
@@ -147,39 +147,40 @@ impl<'s> Tracer<'s> {
         common: Option<[f32; 3]>,
         packet: impl Fn(usize, usize) -> RayPacket,
         found: &mut [Found],
+        room: &mut Room,
     ) -> Counts {
         let packets = |k: usize| std::array::from_fn(|p| packet(k, p));
-        let mut tiles: Vec<Tile> = (0..found.len()).map(|k| Tile::new(packets(k), common)).collect();
-        self.find(&mut tiles, found)
+        room.tiles.clear();
+        room.tiles.extend((0..found.len()).map(|k| Tile::new(packets(k), common)));
+        self.find(room, found)
     }
 
-    fn find(&self, tiles: &mut [Tile], found: &mut [Found]) -> Counts {
-        let mut walk = Walk::default();
-        self.tree.closest_tiles(tiles, &mut walk);
+    fn find(&self, Room { tiles, walk }: &mut Room, found: &mut [Found]) -> Counts {
+        self.tree.closest_tiles(tiles, walk);
         for (tile, found) in tiles.iter().zip(found) {
             for (p, found) in found.packets.iter_mut().enumerate() {
                 let rays = &tile.packets[p];
                 *found = self.found(rays, rays.t_max, tile.hits[p]);
             }
         }
-        walk.counts
+        std::mem::take(&mut walk.counts)
     }
 
     /// Which rays of some tiles of a batch meet anything, a bit each, from tile `first` on, and the tests that took.
-    pub fn find_occluded(&self, batch: &RayBatch, first: usize, dark: &mut [u64]) -> Counts {
-        let mut walk = Walk::default();
-        let mut tiles = vec![Tile::empty(); dark.len()];
-        batch.unpack(first, &mut tiles);
+    pub fn find_occluded(&self, batch: &RayBatch, first: usize, dark: &mut [u64], room: &mut Room) -> Counts {
+        let Room { tiles, walk } = room;
+        tiles.resize(dark.len(), Tile::empty());
+        batch.unpack(first, tiles);
         let live = |tile: &Tile| (0..PACKETS).map(|p| u64::from(tile.packets[p].live().bits()) << (p * LANES)).sum();
         for (tile, dark) in tiles.iter().zip(&mut *dark) {
             *dark = live(tile);
         }
-        self.tree.occluded_tiles(&mut tiles, &mut walk);
+        self.tree.occluded_tiles(tiles, walk);
         for (tile, dark) in tiles.iter().zip(dark) {
             let after: u64 = live(tile);
             *dark &= !after;
         }
-        walk.counts
+        std::mem::take(&mut walk.counts)
     }
 
     /// Whether one ray meets anything.
@@ -238,6 +239,13 @@ impl<'s> Tracer<'s> {
             Some(Hit { t, primitive: primitives[i], material, normal, uv, front, point, error })
         })
     }
+}
+
+/// Room for some tiles of a batch and for their walk, to be used again: one a thread.
+#[derive(Debug, Default)]
+pub struct Room {
+    tiles: Vec<Tile>,
+    walk: Walk,
 }
 
 /// Rays of a tile.

@@ -242,7 +242,9 @@ impl Octant {
     /// looked at: for one ray where it enters them.
     #[inline(always)]
     fn meets(&self, node: &Node, rays: &[u16], slots: &mut [u8], lines: &[Line]) -> (Float8, u32) {
-        let planes = [0, 1, 2].map(|k| node.planes(self.near[k]));
+        // Spelled out: `map` of an array is a call.
+        let [x, y, z] = self.near;
+        let planes = [node.planes(x), node.planes(y), node.planes(z)];
         if let [ray] = rays {
             let (entry, met) = lines[usize::from(*ray)].meets(&planes);
             return (entry, met.bits());
@@ -253,7 +255,7 @@ impl Octant {
             *slots = met.bits() as u8;
             any |= met;
         }
-        let [x, y, z] = [0, 1, 2].map(|k| planes[k].0 * self.signs[k]);
-        (x + y + z, any.bits())
+        let [x, y, z] = self.signs;
+        (planes[0].0 * x + planes[1].0 * y + planes[2].0 * z, any.bits())
     }
 }

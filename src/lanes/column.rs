@@ -12,8 +12,10 @@ pub trait Columns: Copy + Send + Sync {
     fn pack(rows: [Option<Self::One>; LANES]) -> Self;
     /// The row of one lane in all lanes.
     fn broadcast(&self, lane: usize) -> Self;
-    /// Lane `i` is a lane of the `i`th block.
-    fn gather(rows: [(&Self, usize); LANES]) -> Self;
+    /// Lane `i` is lane `row(i).1` of block `row(i).0`. What of it nobody uses is not even read.
+    fn gather<'a>(row: impl Fn(usize) -> (&'a Self, usize) + Copy) -> Self
+    where
+        Self: 'a;
 }
 
 impl Columns for Float8 {
@@ -29,8 +31,16 @@ impl Columns for Float8 {
     }
 
     #[inline(always)]
-    fn gather(rows: [(&Self, usize); LANES]) -> Self {
-        Float8::from(rows.map(|(block, lane)| block.as_array()[lane % LANES]))
+    fn gather<'a>(row: impl Fn(usize) -> (&'a Self, usize) + Copy) -> Self
+    where
+        Self: 'a,
+    {
+        let mut lanes = [0.0; LANES];
+        for (i, x) in lanes.iter_mut().enumerate() {
+            let (block, lane) = row(i);
+            *x = block.as_array()[lane % LANES];
+        }
+        Float8::from(lanes)
     }
 }
 
@@ -48,9 +58,15 @@ impl Columns for Vec3x8 {
     }
 
     #[inline(always)]
-    fn gather(rows: [(&Self, usize); LANES]) -> Self {
-        let axis = |f: fn(&Vec3x8) -> &Float8| Float8::gather(rows.map(|(block, lane)| (f(block), lane)));
-        Vec3x8::new(axis(|v| &v.x), axis(|v| &v.y), axis(|v| &v.z))
+    fn gather<'a>(row: impl Fn(usize) -> (&'a Self, usize) + Copy) -> Self
+    where
+        Self: 'a,
+    {
+        Vec3x8::new(
+            Float8::gather(|i| (&row(i).0.x, row(i).1)),
+            Float8::gather(|i| (&row(i).0.y, row(i).1)),
+            Float8::gather(|i| (&row(i).0.z, row(i).1)),
+        )
     }
 }
 
@@ -67,8 +83,11 @@ impl<C: Columns, const N: usize> Columns for [C; N] {
     }
 
     #[inline(always)]
-    fn gather(rows: [(&Self, usize); LANES]) -> Self {
-        std::array::from_fn(|k| C::gather(rows.map(|(block, lane)| (&block[k], lane))))
+    fn gather<'a>(row: impl Fn(usize) -> (&'a Self, usize) + Copy) -> Self
+    where
+        Self: 'a,
+    {
+        std::array::from_fn(|k| C::gather(|i| (&row(i).0[k], row(i).1)))
     }
 }
 
@@ -85,7 +104,10 @@ impl<A: Columns, B: Columns> Columns for (A, B) {
     }
 
     #[inline(always)]
-    fn gather(rows: [(&Self, usize); LANES]) -> Self {
-        (A::gather(rows.map(|(block, lane)| (&block.0, lane))), B::gather(rows.map(|(block, lane)| (&block.1, lane))))
+    fn gather<'a>(row: impl Fn(usize) -> (&'a Self, usize) + Copy) -> Self
+    where
+        Self: 'a,
+    {
+        (A::gather(|i| (&row(i).0.0, row(i).1)), B::gather(|i| (&row(i).0.1, row(i).1)))
     }
 }

@@ -10,7 +10,7 @@ use crate::lanes::{Ray, UNIT_ROUNDOFF};
 use crate::plan::validate;
 use crate::reference::{self, Reference};
 use crate::scene::Scene;
-use crate::tracer::{Found, Hit, RayBatch, TILE, Tracer};
+use crate::tracer::{Found, Hit, RayBatch, Room, TILE, Tracer};
 
 /// Tiles a task: work for some hundred microseconds.
 const CHUNK: usize = 64;
@@ -109,8 +109,8 @@ impl<'s> Query<'s> {
         self.pool.install(|| match (&self.asked, answers) {
             (Asked::Tracer(tracer), Answers::Tiles(found)) => {
                 let tasks = found.par_chunks_mut(CHUNK).enumerate();
-                let trace = |(i, found)| tracer.find_closest(&batch.columns, i * CHUNK, found);
-                tasks.map(trace).reduce(Counts::default, Counts::sum)
+                let trace = |room: &mut Room, (i, found)| tracer.find_closest(&batch.columns, i * CHUNK, found, room);
+                tasks.map_init(Room::default, trace).reduce(Counts::default, Counts::sum)
             }
             (Asked::Reference(reference), Answers::Reference(hits)) => {
                 let tasks = hits.par_iter_mut().zip(&batch.rays);
@@ -126,8 +126,8 @@ impl<'s> Query<'s> {
         self.pool.install(|| match &self.asked {
             Asked::Tracer(tracer) => {
                 let tasks = dark.par_chunks_mut(CHUNK).enumerate();
-                let trace = |(i, dark)| tracer.find_occluded(&batch.columns, i * CHUNK, dark);
-                tasks.map(trace).reduce(Counts::default, Counts::sum)
+                let trace = |room: &mut Room, (i, dark)| tracer.find_occluded(&batch.columns, i * CHUNK, dark, room);
+                tasks.map_init(Room::default, trace).reduce(Counts::default, Counts::sum)
             }
             Asked::Reference(reference) => {
                 let tasks = dark.par_iter_mut().zip(batch.rays.par_chunks(TILE));

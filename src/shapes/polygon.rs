@@ -30,25 +30,26 @@ impl<const N: usize> Part for PolygonPart<N> {
     #[inline(always)]
     fn anchor<'a>(rows: &Self::Rows, origin: &Vec3x8, _: impl Fn(usize) -> Option<&'a Self>) -> Anchor<N> {
         let (normal, corners) = rows;
-        let a: [Vec3x8; N] = std::array::from_fn(|k| corners[k] - *origin);
-        let side: [Vec3x8; N] = std::array::from_fn(|k| corners[(k + 1) % N] - corners[k]);
-        let mut edges: [Vec3x8; N] = std::array::from_fn(|k| a[k].cross(side[k]));
-        // A corner that is repeated has an edge of no length, which says nothing: another one stands in for it.
-        for k in 4..N - 1 {
-            let same = Mask8::le(side[k].abs().sum(), Float8::ZERO);
-            edges[k] = Vec3x8::select(same, edges[k - 1], edges[k]);
-        }
+        let mut edges = [Vec3x8::ZERO; N];
         let (mut reach, mut size) = (Float8::ZERO, Float8::ZERO);
         for k in 0..N {
-            reach = reach.fast_max(a[k].abs().sum() + corners[k].abs().sum());
-            size = size.fast_max(side[k].abs().sum());
+            let (a, side) = (corners[k] - *origin, corners[(k + 1) % N] - corners[k]);
+            let length = side.abs().sum();
+            edges[k] = a.cross(side);
+            // A corner that is repeated has an edge of no length, which says nothing: another one stands in for it.
+            if (4..N - 1).contains(&k) {
+                edges[k] = Vec3x8::select(Mask8::le(length, Float8::ZERO), edges[k - 1], edges[k]);
+            }
+            reach = reach.fast_max(a.abs().sum() + corners[k].abs().sum());
+            size = size.fast_max(length);
         }
         // Corners round with the scene, a with the subtraction: each moves an edge by two of its roundings, and turns
         // it by as much over the widest way across, of which two edges make one of four corners, four one of eight.
         // Products, sum and direction round six times.
         let bound = roundings(if N > 4 { 18.0 } else { 12.0 }) * reach * size;
-        let error = height_error(*normal, corners[0], a[0]);
-        Anchor { height: normal.dot(a[0]), error, normal: *normal, edges, bound }
+        let first = corners[0] - *origin;
+        let error = height_error(*normal, corners[0], first);
+        Anchor { height: normal.dot(first), error, normal: *normal, edges, bound }
     }
 
     /// The ray passes each edge ab on the same side: the sign of `dir . (a x b)`, with a and b seen from

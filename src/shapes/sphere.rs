@@ -37,7 +37,8 @@ impl Part for SpherePart {
         let mut c = ff - r2;
         let near = Mask8::lt(c.abs(), r2);
         if near.any() {
-            c = near_products(near, c, origin, part);
+            let origin = *origin; // a copy for the call alone: the loop around it keeps its own in registers
+            c = near_products(near, c, &origin, part);
         }
         // The center rounds with the scene, f with the subtraction, and the direction moves the ray by a rounding
         // of f beside the center; 1-norms stand for lengths.

@@ -87,8 +87,8 @@ impl<P: Part> Store<P> {
 
     /// Lane `k` is row `rows[k]`.
     #[inline(always)]
-    pub fn gather(&self, rows: [usize; LANES]) -> P::Rows {
-        P::Rows::gather(rows.map(|row| (self.block(row / LANES), row % LANES)))
+    pub fn gather(&self, rows: &[usize; LANES]) -> P::Rows {
+        P::Rows::gather(|i| (self.block(rows[i] / LANES), rows[i] % LANES))
     }
 
     /// Which sides of the rows are seen.

@@ -276,7 +276,7 @@ impl<const NORMAL: bool> Visit for SurfaceOf<'_, NORMAL> {
         let first = self.rows[0];
         let (surface, owners) = match self.rows == [first; LANES] {
             true => (P::surface(&store.splat(first), self.rays, self.t), [store.owner(first); LANES]),
-            false => (P::surface(&store.gather(self.rows), self.rays, self.t), self.rows.map(|row| store.owner(row))),
+            false => (P::surface(&store.gather(&self.rows), self.rays, self.t), self.rows.map(|row| store.owner(row))),
         };
         let surface = if NORMAL { Surface8 { normal: surface.normal, ..Surface8::NOTHING } } else { surface };
         (surface, owners)

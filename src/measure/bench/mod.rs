@@ -19,7 +19,7 @@ use crate::integrate::CameraRays;
 use crate::lanes::{LANES, Ray};
 use crate::render::{Answers, Batch, Engine, Query, RenderError, Renderer};
 use crate::scene::Scene;
-use crate::tracer::{Found, Hit, TILE, Tracer};
+use crate::tracer::{Found, Hit, Room, TILE, Tracer};
 
 /// Fewest repetitions.
 pub const LEAST_REPEATS: u32 = 5;
@@ -252,13 +252,13 @@ impl Bench<'_> {
         let eights = rays::eights(renderer.image());
         let mut found = vec![Found::default(); eights.len().div_ceil(TILE / LANES)];
         let tracer = self.query.tracer();
-        let trace = |(found, eights): (&mut [Found], &[Eight])| {
-            tracer.map_or(Counts::default(), |tracer| camera_tiles(tracer, &generator, eights, found))
+        let trace = |room: &mut Room, (found, eights): (&mut [Found], &[Eight])| {
+            tracer.map_or(Counts::default(), |tracer| camera_tiles(tracer, &generator, eights, found, room))
         };
         let once = || {
             self.query.install(|| {
                 let tasks = found.par_chunks_mut(CHUNK).zip(eights.par_chunks(CHUNK * TILE / LANES));
-                tasks.map(trace).reduce(Counts::default, Counts::sum)
+                tasks.map_init(Room::default, trace).reduce(Counts::default, Counts::sum)
             })
         };
         let (counts, times) = self.timed(count, once);
@@ -343,12 +343,18 @@ struct Times {
     cpu: Vec<f64>,
 }
 
-fn camera_tiles(tracer: &Tracer, generator: &CameraRays, eights: &[Eight], found: &mut [Found]) -> Counts {
+fn camera_tiles(
+    tracer: &Tracer,
+    generator: &CameraRays,
+    eights: &[Eight],
+    found: &mut [Found],
+    room: &mut Room,
+) -> Counts {
     let packets = |k: usize, p: usize| {
         let pixels = eights.get(k * (TILE / LANES) + p).map_or(&[][..], Vec::as_slice);
         generator.packet(&generator.exact(&rays::samples(generator, pixels)), pixels.len())
     };
-    tracer.find_made(generator.common_origin(), packets, found)
+    tracer.find_made(generator.common_origin(), packets, found, room)
 }
 
 /// CPU seconds that this thread spent so far.
