@@ -6,7 +6,10 @@ use std::path::{Path, PathBuf};
 
 use super::particles::{self, Columns, Format, Look, Trajectory};
 use super::picture_file::Picture;
-use super::{ColorSpace, Scene, SceneError, SceneErrors, fit, nff, toml};
+use super::{ColorSpace, Filter, ImageSettings, Scene, SceneError, SceneErrors, fit, nff, toml};
+
+/// Samples per pixel of a scene that says no picture, as in scene files.
+const SPP: u32 = 16;
 
 /// A scene file that is read at one frame after the other. Frames count from 1, and those before the first key of
 /// an animated value have that key's value.
@@ -104,7 +107,7 @@ impl Frames {
         self
     }
 
-    /// Another size of the picture; cameras that are placed so that they see everything need to know it.
+    /// Another size of the picture, or the first one of a scene that says none; cameras that are placed so that they see everything need to know it.
     pub fn resolution(mut self, resolution: Option<(u32, u32)>) -> Self {
         self.resolution = resolution;
         self
@@ -151,8 +154,10 @@ impl Frames {
                 }
             }
         };
-        if let (Some((width, height)), Some(image)) = (self.resolution, &mut draft.scene.image) {
-            (image.width, image.height) = (width, height);
+        if let Some((width, height)) = self.resolution {
+            let first = ImageSettings { width, height, spp: SPP, filter: Filter::default() };
+            let image = draft.scene.image.take().unwrap_or(first);
+            draft.scene.image = Some(ImageSettings { width, height, ..image });
         }
         Ok(draft)
     }

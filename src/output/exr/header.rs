@@ -131,7 +131,12 @@ fn layer_attributes(picture: &Picture, description: &Description) -> LayerAttrib
     }
     // What was said of other samples is said anew; a damaged file may have said what none can.
     let is_about_samples = |name: &[u8]| manifest::is_about(name) || name == PIXEL_HASH.as_bytes();
-    attributes.other.retain(|name, _| is_sound(name.as_slice()) && !is_about_samples(name.as_slice()));
+    // Colours and time codes are shared by all parts, and may not stand among those of one.
+    let is_shared =
+        |value: &AttributeValue| matches!(value, AttributeValue::Chromaticities(_) | AttributeValue::TimeCode(_));
+    attributes
+        .other
+        .retain(|name, value| is_sound(name.as_slice()) && !is_about_samples(name.as_slice()) && !is_shared(value));
     attributes.other.extend(own_attributes(description).map(|(name, value)| (text(name), value)));
     attributes
 }
