@@ -30,7 +30,7 @@ const GROUND: &str = "scene";
 
 /// Where a crate may be named.
 const CRATES: [(&str, &[&str]); 2] =
-    [("wide", &["lanes"]), ("rayon", &["render", "batch", "accel/build", "measure", "cli", "output"])];
+    [("wide", &["lanes"]), ("rayon", &["render", "batch", "accel/build", "shapes/store", "measure", "cli", "output"])];
 
 #[derive(Debug)]
 struct File {

@@ -59,7 +59,7 @@ fn one_scene_that_fails_does_not_stop_the_others() {
     let small = "--resolution 16x12 --spp 1";
     let (_, err) = room.texts(&format!("render a.toml b.toml c.toml --out-dir out {small}"), 1);
     assert!(err.contains("1 of 3 pictures failed: out/b.exr"), "{err}");
-    assert!(err.contains("b.toml:24:10: sphere radius must be > 0, found -1"), "{err}");
+    assert!(err.contains("b.toml:27:10: sphere radius must be > 0, found -1"), "{err}");
     assert!(room.path("out/a.exr").exists() && room.path("out/c.exr").exists() && !room.path("out/b.exr").exists());
     let (_, err) = room.texts(&format!("render a.toml ./a.toml --out-dir out {small}"), 2);
     assert!(err.contains("would be the picture of two jobs, 1 and 2"), "{err}");

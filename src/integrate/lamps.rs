@@ -212,6 +212,10 @@ impl Direct<'_> {
                 for i in bits(left[p]) {
                     let row = sink.shadows.hit(p, i);
                     let Some(kind) = row.kind() else { continue };
+                    // The same place again: f64 found it a rounding further on.
+                    if t.as_array()[i] <= from[p].as_array()[i] {
+                        continue;
+                    }
                     let place = places[tree.stores().owner(kind, row.row()).primitive as usize];
                     let share = self.met_share(place, wave, (p, i), t.as_array()[i]);
                     let sum = Vec3x8::lane(&sink.radiance[p], i);
@@ -219,7 +223,7 @@ impl Direct<'_> {
                     sink.radiance[p].set_lane(i, std::array::from_fn(|k| sum[k] + radiance[k] * share * weight[k]));
                     met |= 1 << i;
                 }
-                (left[p], from[p]) = (met, t);
+                (left[p], from[p]) = (met, t * float8(1.0 + NEARER));
             }
         }
     }

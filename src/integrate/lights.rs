@@ -183,7 +183,7 @@ impl Shaded {
                 // Seen from the light the surface is as uncertain as the ray is long: beyond the bound of any kernel on
                 // its own surface, or every ray would have to be decided again.
                 let way = (position - self.point).abs();
-                let error = float8(48.0 * UNIT_ROUNDOFF).mul_add(way.x + way.y + way.z, self.error * float8(3.0));
+                let error = float8(8.0 * UNIT_ROUNDOFF).mul_add(way.x + way.y + way.z, self.error);
                 let dir = self.leave(true, error) - position;
                 RayPacket::new(position, dir, float8(1.0 - 16.0 * UNIT_ROUNDOFF), live)
             }

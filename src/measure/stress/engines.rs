@@ -7,7 +7,7 @@ use crate::accel::Walk;
 use crate::lanes::Ray;
 use crate::reference::{self, Reference};
 use crate::scene::Scene;
-use crate::tracer::Tracer;
+use crate::tracer::{Hit, Tracer};
 
 /// A way to find what a ray meets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -75,7 +75,7 @@ impl<'s> Asked<'s> {
     }
 }
 
-fn answer(hit: crate::Hit) -> Answer {
+fn answer(hit: Hit) -> Answer {
     let normal = Some(DVec3::from_array(hit.normal.map(f64::from)));
     Answer { t: f64::from(hit.t), primitive: hit.primitive as usize, normal }
 }
