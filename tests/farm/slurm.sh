@@ -17,9 +17,9 @@ trap 'bash "$here/lab.sh" down; rm -rf "$SLURM_LAB"' EXIT
 failures=0
 fail() { echo "  FAILED: $*"; failures=$((failures + 1)); }
 
-# $1: the last job. Waits for it, for two minutes at the most.
+# $1: the last job. Waits for it, for five minutes at the most: a requeued task begins after two.
 await() {
-  for _ in $(seq 600); do
+  for _ in $(seq 1500); do
     [ -z "$(squeue -h -j "$1" 2>/dev/null)" ] && return
     sleep 0.2
   done

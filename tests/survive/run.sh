@@ -47,13 +47,13 @@ millis() { echo $(($(date +%s%N) / 1000000)); }
 
 killed() { # kill -9 at random times, 20 times over one batch, and resume
   scene s 1
-  "$octray" render s.toml --frames 1-60 --out-dir whole --no-date -q || fail "the unbroken run"
+  "$octray" render s.toml --frames 1-40 --spp 16 --out-dir whole --no-date -q || fail "the unbroken run"
   local begin took runs=0
   begin=$(millis)
-  "$octray" render s.toml --frames 1-60 --out-dir timed --no-date -q
+  "$octray" render s.toml --frames 1-40 --spp 16 --out-dir timed --no-date -q
   took=$(($(millis) - begin))
   for _ in $(seq 20); do
-    "$octray" render s.toml --frames 1-60 --out-dir out --no-date -q --resume 2>/dev/null &
+    "$octray" render s.toml --frames 1-40 --spp 16 --out-dir out --no-date -q --resume 2>/dev/null &
     local pid=$!
     sleep "$(awk -v most="$took" -v r="$RANDOM" 'BEGIN { printf "%.3f", most / 12000 * r / 32768 }')"
     kill -9 $pid 2>/dev/null && runs=$((runs + 1))
@@ -64,7 +64,7 @@ killed() { # kill -9 at random times, 20 times over one batch, and resume
       cmp -s "$file" "whole/${file#out/}" || fail "$file is not what it should be"
     done
   done
-  "$octray" render s.toml --frames 1-60 --out-dir out --no-date -q --resume || fail "the last run"
+  "$octray" render s.toml --frames 1-40 --spp 16 --out-dir out --no-date -q --resume || fail "the last run"
   expect "$(sums out)" "$(sums whole)" "the same bytes"
   expect "$(names out '.*.tmp' | wc -l)" 0 "hidden files left"
   echo "  $runs of 20 runs were killed, of $took ms each"
