@@ -178,7 +178,7 @@ fn wrong_usage_says_what_would_be_right() {
         ("render scene.toml --camera left", "no camera named \"left\""),
         ("render scene.toml --spp 0", "1..="),
         ("render scene.toml --max-depth 0", "1..="),
-        ("render scene.toml --integrator path", "possible values: direct"),
+        ("render scene.toml --integrator radiosity", "possible values: direct, ao, path"),
         ("render scene.toml --engine gpu", "possible values: packet, single, reference"),
         ("render scene.toml -t many", "invalid value"),
         ("render scene.toml --seed -1", "invalid value '-1' for '--seed <N>'"),

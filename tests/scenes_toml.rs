@@ -714,7 +714,7 @@ fn the_schema_and_the_reader_know_the_same_keys() {
         by_schema.sort();
         assert_eq!(keys_by_reader(text), by_schema, "{text}");
     }
-    assert_eq!(tables.len(), 37, "{:?}", tables.keys());
+    assert_eq!(tables.len(), 44, "{:?}", tables.keys());
 }
 
 #[test]

@@ -113,7 +113,8 @@ impl<'s> Task<'s> {
             return block.trace(&frame.rays, &frame.direct(), self.spp, &mut Silent, stop);
         };
         // What a pixel costs depends on those that are traced with it: they must not depend on a crop.
-        let whole = if plan.layers.has(Aov::Cost) { block.whole() } else { *block };
+        let asked_for_cost = plan.layers.has(Aov::Cost) && !self.unasked;
+        let whole = if asked_for_cost { block.whole() } else { *block };
         let mut tape = LayerTape::new(frame, plan, whole.window.area());
         let mut work = whole.trace(&frame.rays, &frame.direct(), self.spp, &mut tape, stop)?;
         work.layers = Some(tape.finish(whole.window));
