@@ -1,6 +1,6 @@
 //! Run time against error: a scene rendered in many ways, each measured against a converged picture.
 //!
-//! Errors are those of [`compare`](super::compare); the converged picture has another seed, so that it shares no sample with
+//! Errors are those of [`compare`]; the converged picture has another seed, so that it shares no sample with
 //! what it judges. Seconds are CPU time of planning, building and tracing, all threads together, the best of up to three: on a
 //! machine that others use as well, wall time says more about them. Wall time stands beside it. A point is on the *front* if
 //! nothing else is both cheaper and nearer to the truth.
