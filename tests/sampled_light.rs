@@ -296,3 +296,56 @@ fn paths_do_not_depend_on_threads_or_crops() {
         assert_eq!(all.get(x, y).as_ref(), Some(pixel));
     }
 }
+
+/// A ball in the half shadow of a lamp, before a plain background.
+fn penumbra() -> Scene {
+    let mut scene = scene_of([sphere(DVec3::new(0.0, 1.0, 0.0), 1.0), disk(DVec3::ZERO, DVec3::Y, 3.0, 0.0)]);
+    scene.lights = vec![area(down(DVec3::new(1.5, 5.0, 1.0), 1.0), 8.0)];
+    scene.background = under(Backdrop::Color(DVec3::splat(0.3)));
+    scene.cameras = vec![pinhole(DVec3::new(0.0, 4.0, 9.0), DVec3::new(0.0, 0.5, 0.0), 50.0)];
+    scene.image = image(96, 80, 8);
+    scene
+}
+
+/// The error told is that against a long run, tiles without noise are left alone, crops have the same bits, and each
+/// pixel's variance and samples are told too.
+#[test]
+fn a_noise_level_is_reached_and_told_truly() {
+    let scene = penumbra();
+    let renderer = || Renderer::new(&scene).expect("complete");
+    let long = renderer().spp(2048).seed(9).render(&()).expect("a picture").picture;
+    for target in [0.03, 0.01] {
+        let rendering = renderer().noise(Some(target)).render(&()).expect("a picture");
+        let reached = rendering.stats.noise.expect("a noise level");
+        let (mut squares, mut sum) = (0.0, 0.0);
+        for (a, b) in rendering.picture.pixels.iter().zip(&long.pixels) {
+            squares += (0..3).map(|k| f64::from(a[k] - b[k]).powi(2)).sum::<f64>();
+            sum += (0..3).map(|k| f64::from(b[k])).sum::<f64>();
+        }
+        let real = (squares * 3.0 * long.pixels.len() as f64).sqrt() / sum;
+        assert!((real / reached.error - 1.0).abs() < 0.15, "{target}: {real} {reached:?}");
+        assert!(reached.worst <= target && reached.short == 0 && reached.error < target, "{reached:?}");
+        assert!(reached.samples > 8 * reached.pixels && reached.pixels == 96 * 96, "{reached:?}");
+        let window = Window { x0: 20, y0: 40, x1: 70, y1: 66 };
+        let part = renderer().noise(Some(target)).crop(window).threads(1).render(&()).expect("a picture").picture;
+        for (index, pixel) in part.pixels.iter().enumerate() {
+            let (x, y) = window.pixel(index);
+            assert_eq!(rendering.picture.get(x, y).as_ref(), Some(pixel), "{x} {y}");
+        }
+    }
+}
+
+/// Both engines stop at the same number of samples.
+#[test]
+fn both_engines_sample_to_the_same_noise() {
+    let mut scene = penumbra();
+    scene.image = image(64, 32, 8);
+    let by = |engine| {
+        let renderer = Renderer::new(&scene).expect("complete").engine(engine).noise(Some(0.03));
+        renderer.render(&()).expect("a picture")
+    };
+    let (packet, reference) = (by(Engine::Packet), by(Engine::Reference));
+    let samples = |rendering: &octray::Rendering| rendering.stats.noise.map(|reached| reached.samples);
+    assert_eq!(samples(&packet), samples(&reference));
+    close(mean(&reds(&packet.picture)), mean(&reds(&reference.picture)), 1e-4, "means");
+}

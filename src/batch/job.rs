@@ -55,6 +55,8 @@ pub struct Settings {
     pub transparent: bool,
     /// Samples per pixel.
     pub spp: Option<u32>,
+    /// Relative error of each tile at which sampling stops.
+    pub noise: Option<f64>,
     /// Seed of the sample pattern.
     pub seed: Option<u64>,
     /// Longest chain of rays.
@@ -105,6 +107,9 @@ impl Job {
         }
         if let Some(spp) = settings.spp {
             renderer = renderer.spp(spp);
+        }
+        if settings.noise.is_some() {
+            renderer = renderer.noise(settings.noise);
         }
         if let Some(depth) = settings.max_depth {
             renderer = renderer.max_depth(depth);

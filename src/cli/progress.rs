@@ -243,14 +243,26 @@ fn summary(job: &Job, report: &Report, start: Instant) -> String {
     let rays = stats.rays.rays.iter().sum::<u64>();
     let (millions, seconds) = (rays as f64 / 1e6, stats.trace_seconds);
     format!(
-        "{job}: {}x{} pixels, {} spp, {millions:.2} million rays in {seconds:.2} s ({:.1} Mrays/s), {:.2} s in all, {}",
+        "{job}: {}x{} pixels, {}, {millions:.2} million rays in {seconds:.2} s ({:.1} Mrays/s), {:.2} s in all, {}",
         window.map_or(0, |window| window.width()),
         window.map_or(0, |window| window.height()),
-        report.spp,
+        samples(report),
         millions / seconds.max(1e-9),
         start.elapsed().as_secs_f64(),
         system::peak_bytes().map_or_else(|| "done".to_owned(), |bytes| format!("{} of memory", system::size(bytes))),
     )
+}
+
+/// Samples per pixel, and the error where that decided on them.
+fn samples(report: &Report) -> String {
+    let Some(reached) = &report.stats.noise else { return format!("{} spp", report.spp) };
+    let mean = reached.samples as f64 / reached.pixels.max(1) as f64;
+    let short = match reached.short {
+        0 => String::new(),
+        tiles => format!(" ({tiles} tiles fell short)"),
+    };
+    let (error, worst) = (reached.error, reached.worst);
+    format!("{mean:.1} spp on average, relative error {error:.4}, of the worst tile {worst:.4}{short}")
 }
 
 #[cfg(test)]

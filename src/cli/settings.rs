@@ -33,6 +33,10 @@ pub struct Settings {
     /// Samples per pixel [default: as in the scene]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     spp: Option<u32>,
+    /// Sample each tile of 32 x 32 pixels until its estimated relative error is below T, such as 0.02; each pixel has at
+    /// least the scene's samples, at most 4096 [default: as in the scene]
+    #[arg(long, value_name = "T", value_parser = noise, conflicts_with = "spp", allow_negative_numbers = true)]
+    noise: Option<f64>,
     /// How light is found [default: as in the scene]
     #[arg(long, value_enum, value_name = "NAME")]
     integrator: Option<IntegratorName>,
@@ -59,6 +63,12 @@ pub struct Settings {
     no_date: bool,
     #[command(flatten)]
     pub atoms: Atoms,
+}
+
+/// A relative error.
+fn noise(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|number| *number > 0.0 && number.is_finite());
+    number.ok_or_else(|| format!("must be a number greater than 0 such as 0.02, found {text:?}"))
 }
 
 /// Integrators by their names in scene files.
@@ -99,6 +109,7 @@ impl Settings {
             layers: self.layers.choice()?,
             transparent: self.background.is_some(),
             spp: self.spp,
+            noise: self.noise,
             seed: self.seed,
             max_depth: self.max_depth,
             integrator: self.integrator.map(Integrator::from),

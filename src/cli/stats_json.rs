@@ -7,7 +7,7 @@ use octray::accel::Counts;
 use octray::batch::{Job, Report};
 use octray::integrate::RayKind;
 use octray::plan::Kind;
-use octray::render::{Engine, IdNames, Stats};
+use octray::render::{Engine, IdNames, Reached, Stats};
 use serde_json::{Map, Value, json};
 
 use super::console::pretty;
@@ -58,6 +58,14 @@ pub fn add_render(stats: &mut Map<String, Value>, work: &Stats, is_reference: bo
     }
     stats.insert("rays".to_owned(), Value::Object(by_kind(&work.rays.rays)));
     stats.insert("hits".to_owned(), Value::Object(hits));
+    if let Some(reached) = &work.noise {
+        let Reached { target, error, worst, short, samples, pixels } = *reached;
+        let noise = json!({
+            "target": target, "error": error, "worst_tile": worst, "short_tiles": short, "samples": samples,
+            "pixels": pixels,
+        });
+        stats.insert("noise".to_owned(), noise);
+    }
     add_tests(stats, &work.tests);
     stats.insert("tiles".to_owned(), json!({ "total": work.tiles, "background": work.background_tiles }));
     stats.insert("skipped".to_owned(), json!(work.skipped));

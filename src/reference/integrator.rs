@@ -4,6 +4,7 @@
 //! 23(6), 1980; what each material and light contributes is said in their doc comments.
 
 use std::f64::consts::PI;
+use std::ops::Range;
 
 use glam::{DVec2, DVec3};
 
@@ -18,6 +19,8 @@ use crate::scene::{Integrator, Model, Paint, RenderSettings};
 /// One pixel of the picture.
 #[derive(Debug, Clone, Default)]
 pub struct Pixel {
+    /// Index of the first sample.
+    pub first: u32,
     /// Linear Rec. 709 and alpha, premultiplied.
     pub rgba: [f64; 4],
     /// What the rays of all samples met, in no order that means anything: sort before comparing.
@@ -132,19 +135,25 @@ impl Reference {
     ///
     /// All samples weigh the same; they are summed in the order of their indices.
     pub fn pixel(&self, view: &View, x: i32, y: i32) -> Pixel {
-        let mut pixel = Pixel::default();
-        for sample in 0..view.spp {
+        self.samples(view, x, y, 0..view.spp)
+    }
+
+    /// Some samples of a pixel.
+    pub fn samples(&self, view: &View, x: i32, y: i32, samples: Range<u32>) -> Pixel {
+        let mut pixel = Pixel { first: samples.start, ..Pixel::default() };
+        let count = samples.len() as f64;
+        for sample in samples {
             let distance = view.distance(x, y, sample);
             pixel.samples.push(CameraSample { distance, ..CameraSample::default() });
             let (key, settings) = (view.key(x, y), &view.settings);
             let mut walk = Walk { tracer: self, view, key, sample, settings, pixel: &mut pixel };
             let (radiance, alpha) = walk.radiance(view.sample(x, y, sample));
-            pixel.samples[sample as usize].radiance = radiance;
+            pixel.samples[(sample - pixel.first) as usize].radiance = radiance;
             for (sum, value) in pixel.rgba.iter_mut().zip([radiance.x, radiance.y, radiance.z, alpha]) {
                 *sum += value;
             }
         }
-        pixel.rgba = pixel.rgba.map(|sum| sum / f64::from(view.spp));
+        pixel.rgba = pixel.rgba.map(|sum| sum / count);
         pixel
     }
 }
@@ -219,7 +228,7 @@ impl Walk<'_> {
         let turn = if hit.front { 1.0 } else { -1.0 };
         let side = Side { n: turn * hit.shading_normal, n_g: turn * hit.normal, dir: step.ray.dir };
         if step.depth == 1 {
-            self.pixel.samples[self.sample as usize].first = Some(First {
+            self.pixel.samples[(self.sample - self.pixel.first) as usize].first = Some(First {
                 primitive: hit.primitive,
                 material: hit.material,
                 point: hit.point,

@@ -2,11 +2,13 @@
 
 use std::ops::Range;
 
+use super::adaptive::{Effort, Noise};
 use super::layers::LayerWork;
 use crate::accel::{Counts, PACKETS};
 use crate::film::{Picture, Window};
 use crate::integrate::{
-    CameraRays, Direct, PixelPattern, RayCounts, RayKind, Record, Room, Samples, Samples8, Summed, Taken, WAVE, Wave,
+    CameraRays, Direct, PixelPattern, RayCounts, RayKind, Record, Room, Samples, Samples8, Silent, Summed, Taken, WAVE,
+    Wave,
 };
 use crate::lanes::LANES;
 use crate::plan::LeftOut;
@@ -32,6 +34,19 @@ pub struct BlockWork {
     pub left_out: LeftOut,
     pub tiles: u64,
     pub background_tiles: u64,
+    /// What was spent on its square to reach a noise level.
+    pub effort: Option<Effort>,
+}
+
+impl BlockWork {
+    /// Adds the counts of more work on the same block.
+    fn absorb(&mut self, more: &BlockWork) {
+        self.rays.add(&more.rays);
+        self.tests.add(&more.tests);
+        self.left_out.add(&more.left_out);
+        self.tiles += more.tiles;
+        self.background_tiles += more.background_tiles;
+    }
 }
 
 /// Camera tiles that are traced before what goes on from them, so that the tiles of that are full.
@@ -61,14 +76,14 @@ impl Block {
         Block::new(Window { x0, y0, x1: x0 + EDGE, y1: y0 + EDGE })
     }
 
-    /// All samples of all pixels: pixels along a Z curve, the samples of one after another, 64 at a time.
+    /// Some samples of all pixels, and their means: pixels along a Z curve, the samples of one after another, 64 at a time.
     /// So a tile is as square as the number of samples allows, and each pixel sums in sample order.
     /// `None` where `stop` asked for that within.
     pub fn trace<R: Record>(
         &self,
         rays: &CameraRays,
         direct: &Direct,
-        spp: u32,
+        range: Range<u32>,
         record: &mut R,
         stop: impl Fn() -> bool,
     ) -> Option<BlockWork> {
@@ -85,9 +100,9 @@ impl Block {
                 return None;
             }
             let pattern = rays.pattern(x, y);
-            let mut sample = 0;
-            while sample < spp {
-                sample = batch.push((x, y), pattern, sample..spp, index);
+            let mut sample = range.start;
+            while sample < range.end {
+                sample = batch.push((x, y), pattern, sample..range.end, index);
                 if batch.count == WAVE {
                     work.tile(&mut batch);
                 }
@@ -95,11 +110,56 @@ impl Block {
         }
         work.tile(&mut batch);
         work.finish(&mut batch);
-        let share = 1.0 / f64::from(spp);
+        let share = 1.0 / range.len() as f64;
         let pixels = work.sums.into_iter().map(|sum| sum.map(|x| (x * share) as f32)).collect();
         let (tiles, background_tiles) = (work.tiles, work.background_tiles);
         let Room { walk, rays, left_out, .. } = work.room;
-        Some(BlockWork { pixels, layers: None, rays, tests: walk.counts, left_out, tiles, background_tiles })
+        Some(BlockWork {
+            pixels,
+            layers: None,
+            rays,
+            tests: walk.counts,
+            left_out,
+            tiles,
+            background_tiles,
+            effort: None,
+        })
+    }
+
+    /// Those of the pixels of a whole square that lie in this part of it.
+    pub fn part<T: Copy>(&self, whole: &Block, pixels: &[T]) -> Vec<T> {
+        let row = |y| whole.window.index(self.window.x0, y).map(|start| start..start + self.window.width());
+        let rows = (self.window.y0..self.window.y1).filter_map(row);
+        rows.flat_map(|row| &pixels[row]).copied().collect()
+    }
+
+    /// The square that it is a part of, sampled until it is good enough, while a record looks on with the first
+    /// samples; all is of that square. `rays` are those of each half of the samples.
+    pub fn trace_until<R: Record>(
+        &self,
+        noise: &Noise,
+        rays: [&CameraRays; 2],
+        direct: &Direct,
+        record: &mut R,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Option<BlockWork> {
+        let whole = self.whole();
+        let mut sum: Option<BlockWork> = None;
+        let draw = |half: usize, range: Range<u32>| match &mut sum {
+            None => {
+                let mut work = whole.trace(rays[half], direct, range, record, stop)?;
+                let pixels = std::mem::take(&mut work.pixels);
+                sum = Some(work);
+                Some(pixels)
+            }
+            Some(sum) => {
+                let work = whole.trace(rays[half], direct, range, &mut Silent, stop)?;
+                sum.absorb(&work);
+                Some(work.pixels)
+            }
+        };
+        let (pixels, effort) = noise.sample(draw)?;
+        sum.map(|work| BlockWork { pixels, effort: Some(effort), ..work })
     }
 
     /// The part of a block's pixels and layers that lies in this one.

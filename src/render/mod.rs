@@ -1,11 +1,13 @@
 //! A frame: tiles over the cores, cancellation, statistics.
 
+mod adaptive;
 mod block;
 mod layers;
 mod query;
 mod reference;
 mod stats;
 mod task;
+mod tiles;
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -15,17 +17,20 @@ use glam::DVec3;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
+pub use self::adaptive::Reached;
 pub use self::layers::IdNames;
 pub use self::query::{Answers, Batch, Query};
 pub use self::stats::Stats;
 pub use self::task::{Task, Traced};
 
+use self::adaptive::Noise;
 use self::block::Block;
 use crate::accel::Tree;
 use crate::film::{Picture, Window};
 use crate::integrate::{CameraRays, Direct, Lamps, RayCounts, Record};
 use crate::output::{self, Description, Losses, Options, OutputError};
 use crate::plan::{InvalidScene, Plan, SkipSet, validate};
+use crate::sample;
 use crate::scene::{Camera, ImageSettings, Integrator, Layers, RenderSettings, Scene};
 
 /// Which tracer finds the hits.
@@ -87,6 +92,11 @@ pub enum RenderError {
     /// The scene was made by hand and breaks a rule.
     #[error(transparent)]
     Scene(#[from] InvalidScene),
+    /// The reference does not do both.
+    #[error(
+        "the reference engine renders layers with as many samples for all pixels: leave the noise level or the layers out"
+    )]
+    NoiseWithLayers,
     /// The threads could not be started.
     #[error("cannot start threads: {0}")]
     Threads(String),
@@ -187,9 +197,17 @@ impl<'s> Renderer<'s> {
         Ok(self)
     }
 
-    /// Samples per pixel, at least 1; a single one sits at the pixel's centre.
+    /// Samples per pixel, at least 1, and no noise level; a single one sits at the pixel's centre.
     pub fn spp(mut self, spp: u32) -> Self {
         self.image.spp = spp.max(1);
+        self.settings.noise = None;
+        self
+    }
+
+    /// Samples each tile of 32 x 32 pixels until its estimated relative error is no larger, from the samples per
+    /// pixel in force on up to 4,096: the same bits in any crop. `None`, or nothing above 0: as many samples for all.
+    pub fn noise(mut self, target: Option<f64>) -> Self {
+        self.settings.noise = target.filter(|target| *target > 0.0);
         self
     }
 
@@ -342,6 +360,10 @@ impl<'s> Renderer<'s> {
         self.checked_window()
     }
 
+    fn noise_level(&self) -> Option<Noise> {
+        self.settings.noise.map(|target| Noise::new(target, self.image.spp))
+    }
+
     fn checked_window(&self) -> Result<Window, RenderError> {
         let display = (self.image.width, self.image.height);
         let full = Window::full(display).grown(self.overscan);
@@ -369,6 +391,9 @@ pub struct Frame<'s> {
     tree: Tree,
     lamps: Lamps<'s>,
     rays: CameraRays,
+    /// Those of the other half of the samples, to a noise level.
+    other_rays: CameraRays,
+    noise: Option<Noise>,
     spp: u32,
     settings: RenderSettings,
     /// What depth is counted along; `None`: along each ray.
@@ -392,9 +417,25 @@ impl<'s> Frame<'s> {
         let image = &renderer.image;
         let display = (image.width, image.height);
         let seed = renderer.settings.seed;
-        let rays = CameraRays::new(renderer.camera, plan.origin, display, image.filter, image.spp, seed);
+        let noise = renderer.noise_level();
+        // A single sample would sit at the centre.
+        let spp = if noise.is_some() { image.spp.max(2) } else { image.spp };
+        let rays = |seed| CameraRays::new(renderer.camera, plan.origin, display, image.filter, spp, seed);
+        let (rays, other_rays) = (rays(seed), rays(sample::other_seed(seed)));
         let (settings, axis) = (renderer.settings.clone(), renderer.camera.view_axis());
-        Frame { plan, tree, lamps, rays, spp: image.spp, settings, axis, plan_seconds, build_seconds }
+        Frame {
+            plan,
+            tree,
+            lamps,
+            rays,
+            other_rays,
+            noise,
+            spp: image.spp,
+            settings,
+            axis,
+            plan_seconds,
+            build_seconds,
+        }
     }
 
     /// What the coordinates of its rays are relative to.
@@ -414,7 +455,7 @@ impl<'s> Frame<'s> {
 
     /// Traces one block on this thread, as a render does, while a record looks on: its pixels row by row.
     pub fn trace_block<R: Record>(&self, block: Window, record: &mut R) -> (Vec<[f32; 4]>, RayCounts) {
-        let work = Block::new(block).trace(&self.rays, &self.direct(), self.spp, record, || false);
+        let work = Block::new(block).trace(&self.rays, &self.direct(), 0..self.spp, record, || false);
         work.map_or_else(Default::default, |work| (work.pixels, work.rays))
     }
 

@@ -120,7 +120,7 @@ fn place(pixel: &Pixel, origin: DVec3) -> (DVec3, DVec2) {
     first.map_or_else(Default::default, |first| (first.point + origin, first.uv))
 }
 
-fn add(counts: &mut RayCounts, pixel: &Pixel) {
+pub(super) fn add(counts: &mut RayCounts, pixel: &Pixel) {
     let rays = pixel.rays;
     for (kind, count) in
         RayKind::ALL.into_iter().zip([rays.camera, rays.shadow, rays.reflection, rays.refraction, rays.bounce])

@@ -1,5 +1,6 @@
 //! What a render did.
 
+use super::adaptive::Reached;
 use super::block::BlockWork;
 use crate::accel::Counts;
 use crate::integrate::RayCounts;
@@ -28,6 +29,8 @@ pub struct Stats {
     pub skipped: Vec<Skipped>,
     /// The same as counts, while blocks are put together.
     pub(super) left_out: LeftOut,
+    /// How good the picture is, where that was asked for.
+    pub noise: Option<Reached>,
     /// Memory of the columns.
     pub column_bytes: usize,
     /// Memory of the tree.

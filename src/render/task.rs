@@ -5,11 +5,13 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use super::adaptive::{Effort, Noise, Reached};
 use super::block::{Block, BlockWork};
 use super::layers::{LayerPlan, LayerTape};
 use super::reference::{RowWork, Rows};
+use super::tiles::{TileWork, Tiles};
 use super::{Engine, Frame, IdNames, RenderError, Renderer, Rendering};
-use crate::film::{Picture, Window};
+use crate::film::{Picture, Samples, Window};
 use crate::integrate::Silent;
 use crate::plan::Skip;
 use crate::scene::{Aov, Layers};
@@ -19,6 +21,8 @@ pub struct Task<'s> {
     display: (u32, u32),
     window: Window,
     spp: u32,
+    /// Relative error asked for.
+    target: Option<f64>,
     work: Work<'s>,
     /// Where layers are asked for.
     layers: Option<LayerPlan<'s>>,
@@ -31,6 +35,8 @@ enum Work<'s> {
     Blocks(Box<Frame<'s>>, Vec<Block>),
     /// By the reference, rows.
     Rows(Box<Rows>),
+    /// By the reference to a noise level, squares of pixels.
+    Tiles(Box<Tiles>),
 }
 
 /// What a block came to; [`Task::finish`] puts it where it belongs. Copies share it.
@@ -42,6 +48,39 @@ pub struct Traced(Arc<Part>);
 enum Part {
     Block(Block, BlockWork),
     Row(RowWork),
+    Tile(TileWork),
+}
+
+impl Traced {
+    fn effort(&self) -> Option<&Effort> {
+        match &*self.0 {
+            Part::Block(_, work) => work.effort.as_ref(),
+            Part::Tile(tile) => Some(&tile.effort),
+            Part::Row(_) => None,
+        }
+    }
+
+    /// Puts samples and variances into the layers of these names.
+    fn tell_effort(&self, picture: &mut Picture) {
+        let Part::Block(block, BlockWork { effort: Some(effort), .. }) = &*self.0 else { return };
+        let (window, whole) = (picture.window, block.whole().window);
+        let inside: Vec<(usize, usize)> = (0..block.window.area())
+            .map(|index| block.window.pixel(index))
+            .filter_map(|(x, y)| window.index(x, y).zip(whole.index(x, y)))
+            .collect();
+        for channel in &mut picture.channels {
+            let Samples::Float(samples) = &mut channel.samples else { continue };
+            let name = channel.name.split('.').next().unwrap_or_default();
+            let part = ["R", "G", "B"].iter().position(|part| channel.name.ends_with(&format!(".{part}")));
+            for (to, from) in &inside {
+                match (name, part) {
+                    ("samples", _) => samples[*to] = effort.samples as f32,
+                    ("variance", Some(part)) => samples[*to] = effort.variance[*from][part],
+                    _ => {}
+                }
+            }
+        }
+    }
 }
 
 impl<'s> Task<'s> {
@@ -51,9 +90,13 @@ impl<'s> Task<'s> {
     /// [`RenderError::BadWindow`].
     pub fn new(renderer: &Renderer<'s>) -> Result<Self, RenderError> {
         let window = renderer.checked_window()?;
-        let work = match renderer.engine {
-            Engine::Reference => Work::Rows(Box::new(Rows::new(renderer, window))),
-            Engine::Packet | Engine::Single => Work::Blocks(Box::new(Frame::prepare(renderer)), Block::cover(window)),
+        let work = match (renderer.engine, renderer.noise_level()) {
+            (Engine::Reference, Some(_)) if !renderer.layers.is_empty() => return Err(RenderError::NoiseWithLayers),
+            (Engine::Reference, Some(noise)) => Work::Tiles(Box::new(Tiles::new(renderer, noise, window))),
+            (Engine::Reference, None) => Work::Rows(Box::new(Rows::new(renderer, window))),
+            (Engine::Packet | Engine::Single, _) => {
+                Work::Blocks(Box::new(Frame::prepare(renderer)), Block::cover(window))
+            }
         };
         let display = (renderer.image.width, renderer.image.height);
         // Work that is not to be left out is done, and what comes of it dropped.
@@ -63,7 +106,7 @@ impl<'s> Task<'s> {
             true => Some(LayerPlan::new(renderer, all)),
             false => (!renderer.layers.is_empty()).then(|| LayerPlan::new(renderer, renderer.layers)),
         };
-        Ok(Task { display, window, spp: renderer.image.spp, work, layers, unasked })
+        Ok(Task { display, window, spp: renderer.image.spp, target: renderer.settings.noise, work, layers, unasked })
     }
 
     /// How many blocks there are.
@@ -71,6 +114,7 @@ impl<'s> Task<'s> {
         match &self.work {
             Work::Blocks(_, blocks) => blocks.len(),
             Work::Rows(_) => self.window.height(),
+            Work::Tiles(tiles) => tiles.blocks().len(),
         }
     }
 
@@ -79,6 +123,7 @@ impl<'s> Task<'s> {
         let pixels = match &self.work {
             Work::Blocks(_, blocks) => blocks[block].window.area(),
             Work::Rows(_) => self.window.width(),
+            Work::Tiles(tiles) => tiles.blocks()[block].window.area(),
         };
         pixels as u64 * u64::from(self.spp)
     }
@@ -96,6 +141,7 @@ impl<'s> Task<'s> {
                 Part::Block(block, self.trace_block(frame, &block, stop)?)
             }
             Work::Rows(rows) => Part::Row(rows.trace(block, self.layers.as_ref(), stop)?),
+            Work::Tiles(tiles) => Part::Tile(tiles.trace(block, stop)?),
         };
         Some(Traced(Arc::new(part)))
     }
@@ -105,22 +151,47 @@ impl<'s> Task<'s> {
         match &*traced.0 {
             Part::Block(block, work) => (block.window, &work.pixels),
             Part::Row(row) => (row.window(self.window), &row.pixels),
+            Part::Tile(tile) => (tile.block.window, &tile.pixels),
         }
     }
 
     fn trace_block(&self, frame: &Frame, block: &Block, stop: &(dyn Fn() -> bool + Sync)) -> Option<BlockWork> {
+        if let Some(noise) = &frame.noise {
+            return self.trace_until(frame, noise, block, stop);
+        }
         let Some(plan) = &self.layers else {
-            return block.trace(&frame.rays, &frame.direct(), self.spp, &mut Silent, stop);
+            return block.trace(&frame.rays, &frame.direct(), 0..self.spp, &mut Silent, stop);
         };
         // What a pixel costs depends on those that are traced with it: they must not depend on a crop.
         let asked_for_cost = plan.layers.has(Aov::Cost) && !self.unasked;
         let whole = if asked_for_cost { block.whole() } else { *block };
         let mut tape = LayerTape::new(frame, plan, whole.window.area());
-        let mut work = whole.trace(&frame.rays, &frame.direct(), self.spp, &mut tape, stop)?;
+        let mut work = whole.trace(&frame.rays, &frame.direct(), 0..self.spp, &mut tape, stop)?;
         work.layers = Some(tape.finish(whole.window));
         if whole.window != block.window {
             block.cut(&whole, &mut work);
         }
+        Some(work)
+    }
+
+    /// To a noise level: layers are those of the first samples.
+    fn trace_until(
+        &self,
+        frame: &Frame,
+        noise: &Noise,
+        block: &Block,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Option<BlockWork> {
+        let (whole, direct, rays) = (block.whole(), frame.direct(), [&frame.rays, &frame.other_rays]);
+        let mut work = match &self.layers {
+            None => block.trace_until(noise, rays, &direct, &mut Silent, stop)?,
+            Some(plan) => {
+                let mut tape = LayerTape::new(frame, plan, whole.window.area());
+                let work = block.trace_until(noise, rays, &direct, &mut tape, stop)?;
+                BlockWork { layers: Some(tape.finish(whole.window)), ..work }
+            }
+        };
+        block.cut(&whole, &mut work);
         Some(work)
     }
 
@@ -131,7 +202,9 @@ impl<'s> Task<'s> {
         let mut stats = match &self.work {
             Work::Blocks(frame, _) => frame.stats(threads, seconds),
             Work::Rows(rows) => rows.stats(threads, seconds),
+            Work::Tiles(tiles) => tiles.stats(threads, seconds),
         };
+        stats.noise = self.target.map(|target| Reached::of(target, traced.iter().filter_map(Traced::effort)));
         for Traced(part) in &traced {
             match &**part {
                 Part::Block(block, work) => {
@@ -139,6 +212,10 @@ impl<'s> Task<'s> {
                     stats.add(work);
                 }
                 Part::Row(row) => row.add_to(&mut picture, &mut stats),
+                Part::Tile(tile) => {
+                    tile.block.copy_to(&tile.pixels, &mut picture);
+                    stats.rays.add(&tile.counts);
+                }
             }
         }
         if let Work::Blocks(frame, _) = &self.work {
@@ -149,8 +226,10 @@ impl<'s> Task<'s> {
             let works = traced.iter().filter_map(|Traced(part)| match &**part {
                 Part::Block(block, work) => Some((block.window, work.layers.as_ref()?)),
                 Part::Row(row) => Some((row.window(self.window), row.layers.as_ref()?)),
+                Part::Tile(_) => None,
             });
             plan.add_to(works, &mut picture);
+            traced.iter().for_each(|traced| traced.tell_effort(&mut picture));
             names = plan.names(&picture);
         }
         Rendering { picture, stats, names }

@@ -22,13 +22,22 @@ pub struct RenderSettings {
     pub max_depth: u32,
     /// Chooses the sample pattern.
     pub seed: u64,
+    /// Relative error of each tile at which sampling stops, > 0; `None`: all pixels have as many samples as the
+    /// picture says. With it those are what each pixel has at least.
+    pub noise: Option<f64>,
     /// How far occluders count in ambient occlusion, scene units, > 0; may be infinite.
     pub ao_distance: f64,
 }
 
 impl Default for RenderSettings {
     fn default() -> Self {
-        RenderSettings { integrator: Integrator::Direct, max_depth: 5, seed: 0, ao_distance: f64::INFINITY }
+        RenderSettings {
+            integrator: Integrator::Direct,
+            max_depth: 5,
+            seed: 0,
+            noise: None,
+            ao_distance: f64::INFINITY,
+        }
     }
 }
 

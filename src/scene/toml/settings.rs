@@ -199,15 +199,13 @@ fn render(table: Table<'_>) -> Option<RenderSettings> {
     let ao_distance = table.or("ao_distance", f64::INFINITY, number(Rule::LENGTH));
     let max_depth = table.or("max_depth", 5, whole(1, DEEPEST));
     let seed = table.or("seed", 0, whole(0, u64::MAX));
-    if let Some(item) = table.item("noise") {
-        let rule = "rendering to a noise level is not in this version: leave \"noise\" out and set \"spp\" of [image]";
-        item.context.fail(&item.span, rule, "");
-    }
+    let noise = table.maybe("noise", number(Rule::POSITIVE));
     table.finish();
     Some(RenderSettings {
         integrator: integrator?,
         max_depth: max_depth? as u32,
         seed: seed?,
+        noise: noise?,
         ao_distance: ao_distance?,
     })
 }

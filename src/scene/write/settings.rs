@@ -71,6 +71,7 @@ fn render(render: &RenderSettings) -> Table {
         .set("integrator", quoted(integrator))
         .set("max_depth", render.max_depth)
         .set("seed", render.seed)
+        .set_some("noise", render.noise.map(number))
         .set_some("ao_distance", distance.map(number))
 }
 

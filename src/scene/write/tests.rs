@@ -127,7 +127,13 @@ fn everything(picture: &Path) -> Scene {
             spp: 7,
             filter: Filter { kind: FilterKind::BlackmanHarris, radius: 2.0 + THIRD },
         }),
-        render: RenderSettings { integrator: Integrator::Ao, max_depth: 9, seed: 1 << 62, ao_distance: 100.0 * THIRD },
+        render: RenderSettings {
+            integrator: Integrator::Ao,
+            max_depth: 9,
+            seed: 1 << 62,
+            noise: Some(THIRD),
+            ao_distance: 100.0 * THIRD,
+        },
         cameras: vec![
             camera("front", Lens::Pinhole { vfov: 100.0 * THIRD }),
             camera("top", Lens::Orthographic { height: THIRD }),
