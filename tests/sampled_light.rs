@@ -303,7 +303,7 @@ fn penumbra() -> Scene {
     scene.lights = vec![area(down(DVec3::new(1.5, 5.0, 1.0), 1.0), 8.0)];
     scene.background = under(Backdrop::Color(DVec3::splat(0.3)));
     scene.cameras = vec![pinhole(DVec3::new(0.0, 4.0, 9.0), DVec3::new(0.0, 0.5, 0.0), 50.0)];
-    scene.image = image(96, 80, 8);
+    scene.image = image(96, 96, 8); // whole tiles: the level told is that of the pixels compared
     scene
 }
 
