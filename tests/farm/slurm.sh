@@ -73,7 +73,7 @@ last=$(sh one.sh | sed 's/.*it \([0-9]*\)$/\1/')
 await "$last"
 "$octray" render turn.toml -o whole.exr --no-date -q
 cat slurm-*.out 2>/dev/null | tail -5
-[ "$("$octray" compare one.exr whole.exr --json | sed -n 's/.*"rmse": *\([0-9.]*\).*/\1/p')" = 0.0 ] || fail "the tiles are not the picture"
+cmp -s one.exr whole.exr || fail "the tiles are not the picture"
 [ ! -e one.parts ] || fail "parts are left"
 [ $failures = 0 ] || { echo "$failures checks failed"; exit 1; }
 echo "Slurm renders the same"
