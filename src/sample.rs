@@ -74,6 +74,12 @@ pub struct Pattern8 {
 }
 
 impl Pattern8 {
+    /// The same pattern in all lanes.
+    #[inline(always)]
+    pub fn splat(Pattern { order, first, second }: Pattern) -> Self {
+        Pattern8 { order: [order; 8], first: [first; 8], second: [second; 8] }
+    }
+
     /// Sets the pattern of one lane.
     #[inline(always)]
     pub fn set(&mut self, lane: usize, pattern: Pattern) {

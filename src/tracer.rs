@@ -85,7 +85,7 @@ impl<'s> Tracer<'s> {
     pub fn relative_to(scene: &'s Scene, origin: DVec3) -> Result<Self, InvalidScene> {
         validate(scene)?;
         let plan = Plan::new(scene, origin);
-        let tree = Tree::new(plan.parts(), &plan.visible);
+        let tree = Tree::planned(&plan);
         Ok(Tracer { plan, tree })
     }
 

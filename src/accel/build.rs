@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::Tree;
 use super::node::{Child, Leaf, Node};
 use crate::lanes::LANES;
-use crate::plan::{Kind, Parts};
+use crate::plan::{Kind, Parts, Plan, Skip};
 use crate::scene::Visible;
 use crate::shapes::{Groups, Part, Stores};
 
@@ -39,11 +39,30 @@ impl Boundable for Item {
 }
 
 impl Tree {
+    /// All that takes part in a plan.
+    pub fn planned(plan: &Plan) -> Self {
+        match plan.skips.leaves_out(Skip::Tree) {
+            true => Tree::straight(plan.parts(), &plan.visible),
+            false => Tree::new(plan.parts(), &plan.visible),
+        }
+    }
+
     /// Takes the parts; `visible` tells by material which sides are seen.
-    pub fn new(mut parts: Parts, visible: &[Visible]) -> Self {
+    pub fn new(parts: Parts, visible: &[Visible]) -> Self {
         let items = items(&parts);
+        Tree::of(parts, visible, items)
+    }
+
+    /// The same without nodes: every ray is held against every part, which is faster where there are few.
+    pub fn straight(parts: Parts, visible: &[Visible]) -> Self {
+        let loose_boxes = items(&parts).iter().map(|item| [item.aabb.min.into(), item.aabb.max.into()]).collect();
+        Tree { loose_boxes, ..Tree::of(parts, visible, Vec::new()) }
+    }
+
+    fn of(mut parts: Parts, visible: &[Visible], items: Vec<Item>) -> Self {
         let mut nodes = Vec::new();
-        let planes = parts.planes.len();
+        let counts =
+            Kind::ALL.map(|kind| if items.is_empty() || kind == Kind::Plane { count(&parts, kind) } else { 0 });
         let (mut size, mut depth, mut groups) = (0.0, 0, None);
         if !items.is_empty() {
             let binary = build_binary(&items);
@@ -57,10 +76,28 @@ impl Tree {
             groups = Some(wide.groups);
         }
         let stores = Stores::new(parts, groups.as_ref(), visible);
-        let plane = |block| Leaf { kind: Kind::Plane, block, count: LANES.min(planes - block * LANES) };
-        let planes = (0..stores.blocks(Kind::Plane)).map(plane).collect();
+        let leaves = |(kind, count): (Kind, usize)| {
+            let leaf = move |block| Leaf { kind, block, count: LANES.min(count - block * LANES) };
+            (0..count.div_ceil(LANES)).map(leaf)
+        };
+        let loose = Kind::ALL.into_iter().zip(counts).flat_map(leaves).collect();
         let culls = stores.hide_any();
-        Tree { stores, nodes, room: LANES * depth, planes, culls, size, one_by_one: false }
+        Tree { stores, nodes, room: LANES * depth, loose, loose_boxes: Vec::new(), culls, size, one_by_one: false }
+    }
+}
+
+fn count(parts: &Parts, kind: Kind) -> usize {
+    match kind {
+        Kind::Sphere => parts.spheres.len(),
+        Kind::Plane => parts.planes.len(),
+        Kind::Disk => parts.disks.len(),
+        Kind::Triangle => parts.triangles.len(),
+        Kind::Quad => parts.quads.len(),
+        Kind::Octagon => parts.octagons.len(),
+        Kind::Box => parts.boxes.len(),
+        Kind::TurnedBox => parts.turned_boxes.len(),
+        Kind::Cylinder => parts.cylinders.len(),
+        Kind::Cone => parts.cones.len(),
     }
 }
 

@@ -9,6 +9,7 @@ mod bundle;
 mod leaf;
 mod line;
 mod node;
+mod outline;
 mod stack;
 mod stream;
 #[cfg(test)]
@@ -16,6 +17,8 @@ mod tests;
 mod tile;
 
 pub use self::tile::{PACKETS, Tile};
+
+use glam::Vec3;
 
 use self::node::{Beam, Leaf, Node};
 use self::stack::Entry;
@@ -29,12 +32,13 @@ use crate::shapes::{RowRef, Stores};
 #[derive(Debug)]
 pub struct Tree {
     stores: Stores,
-    nodes: Vec<Node>,  // the root first; empty where nothing has bounds
-    room: usize,       // the most that waits on the way down
-    planes: Vec<Leaf>, // planes, which have no bounds
-    culls: bool,       // some row hides a side
-    size: f32,         // longest edge of the bounds, scene units
-    one_by_one: bool,  // no tiles
+    nodes: Vec<Node>,            // the root first; empty where nothing has bounds
+    room: usize,                 // the most that waits on the way down
+    loose: Vec<Leaf>,            // met by every ray: planes, which have no bounds, and all there is of tiny scenes
+    loose_boxes: Vec<[Vec3; 2]>, // bounds of what is loose, planes apart
+    culls: bool,                 // some row hides a side
+    size: f32,                   // longest edge of the bounds, scene units
+    one_by_one: bool,            // no tiles
 }
 
 /// Work done, and room for it: one a thread.

@@ -108,6 +108,16 @@ impl Node {
         self.columns[SIZES].broadcast(slot)
     }
 
+    /// The slots that hold something: lower and upper corners of their boxes.
+    pub fn boxes(&self) -> impl Iterator<Item = (usize, Vec3, Vec3)> {
+        let corner = |slot: usize, side: usize| {
+            let at = |axis: usize| self.columns[2 * axis + side].as_array()[slot];
+            Vec3::new(at(0), at(1), at(2))
+        };
+        let boxes = (0..LANES).map(move |slot| (slot, corner(slot, 0), corner(slot, 1)));
+        boxes.filter(|(_, min, max)| min.x <= max.x)
+    }
+
     /// The planes of all boxes that are entered and left by on an axis, a lane a child.
     #[inline(always)]
     pub fn planes(&self, near: usize) -> (Float8, Float8) {

@@ -189,14 +189,14 @@ impl Tree {
     }
 
     /// Walks with the packets that go the same way, all together or each on its own. Left are those whose own rays
-    /// do not, which have been held against the planes.
+    /// do not, which have been held against what is loose.
     fn walk_tile<const ANY: bool, const CULL: bool>(&self, tile: &mut Tile, walk: &mut Walk) -> u32 {
         let live_packets = |tile: &Tile| (0..PACKETS).map(|p| u32::from(tile.packets[p].live().any()) << p).sum();
         let mut all = live_packets(tile);
-        for leaf in &self.planes {
+        for leaf in &self.loose {
             tile.meet::<ANY, CULL>(self, *leaf, all, &mut walk.counts);
         }
-        if ANY && !self.planes.is_empty() {
+        if ANY && !self.loose.is_empty() {
             all = live_packets(tile);
         }
         if all == 0 || self.nodes.is_empty() {

@@ -13,7 +13,7 @@ use octray::scene::{
     Texture, TextureKind, Visible,
 };
 use octray::shapes::{Part, Store, Visit};
-use octray::{Tracer, scene};
+use octray::{Renderer, Tracer, scene};
 use serde_json::{Map, Value, json};
 
 use super::Run;
@@ -89,7 +89,7 @@ fn info(path: &Path, scene: &Scene, load_seconds: f64) -> Result<Value, InvalidS
         "image": scene.image.as_ref().map(image),
         "render": render(scene),
         "warnings": scene.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
-        "skipped": tracer.plan().skips.report(&LeftOut::default()),
+        "skipped": skipped(scene, &tracer),
         "seconds": { "load": load_seconds, "build": build_seconds },
         "memory": {
             "peak_bytes": system::peak_bytes(),
@@ -97,6 +97,12 @@ fn info(path: &Path, scene: &Scene, load_seconds: f64) -> Result<Value, InvalidS
             "tree_bytes": tracer.tree().bytes(),
         },
     }))
+}
+
+/// What a render leaves out, or, without a camera or a size, what queries do.
+fn skipped(scene: &Scene, tracer: &Tracer) -> Value {
+    let render = Renderer::new(scene).map(|renderer| renderer.plan().skips);
+    json!(render.as_ref().unwrap_or(&tracer.plan().skips).report(&LeftOut::default()))
 }
 
 /// How many there are, in all and of each kind that there is.

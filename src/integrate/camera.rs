@@ -19,6 +19,7 @@ pub struct CameraRays {
     /// Origin, relative to the plan's, and its change.
     origin: [DVec3; 3],
     optics: Optics,
+    common: Option<[f32; 3]>,
 }
 
 /// What becomes of the ray through a point of the picture.
@@ -57,13 +58,14 @@ impl CameraRays {
             }
             Lens::Panoramic => ([forward, DVec3::ZERO, DVec3::ZERO], [eye, DVec3::ZERO, DVec3::ZERO]),
         };
-        CameraRays { filter: FilterTable::new(filter), seed, centered: spp == 1, dir, origin, optics }
+        let shared = origin[1] == DVec3::ZERO && !matches!(optics, Optics::Lens(..));
+        let common = shared.then(|| origin[0].as_vec3().to_array());
+        CameraRays { filter: FilterTable::new(filter), seed, centered: spp == 1, dir, origin, optics, common }
     }
 
     /// The origin, where all rays share it.
     pub fn common_origin(&self) -> Option<[f32; 3]> {
-        let shared = self.origin[1] == DVec3::ZERO && !matches!(self.optics, Optics::Lens(..));
-        shared.then(|| self.origin[0].as_vec3().to_array())
+        self.common
     }
 
     /// The sample pattern of a pixel.
@@ -73,23 +75,14 @@ impl CameraRays {
     }
 
     /// Eight rays in f64.
-    #[inline(always)]
     pub fn exact(&self, samples: &Samples8) -> ExactPacket {
         self.exact_at(samples, &self.points(samples))
     }
 
     /// Eight rays in f64, through the [points](CameraRays::points) of their samples.
-    #[inline(always)]
     pub fn exact_at(&self, samples: &Samples8, points: &[[f64; LANES]; 2]) -> ExactPacket {
-        let at = |base: &[DVec3; 3], k: usize| {
-            let mut axis = [0.0; LANES];
-            for lane in 0..LANES {
-                axis[lane] = base[0][k] + base[1][k] * points[0][lane] + base[2][k] * points[1][lane];
-            }
-            axis
-        };
-        let mut rays =
-            ExactPacket { origin: [0, 1, 2].map(|k| at(&self.origin, k)), dir: [0, 1, 2].map(|k| at(&self.dir, k)) };
+        let at = |base: &[DVec3; 3]| [affine(base, 0, points), affine(base, 1, points), affine(base, 2, points)];
+        let mut rays = ExactPacket { origin: at(&self.origin), dir: at(&self.dir) };
         match &self.optics {
             Optics::Straight => {}
             Optics::Lens(radii, focus) => rays.through_lens(samples, radii, *focus),
@@ -98,31 +91,44 @@ impl CameraRays {
         rays
     }
 
-    /// The same rounded; lanes from `count` on are dead.
+    /// The same rounded to f32; lanes from `count` on are dead.
     #[inline(always)]
     pub fn packet(&self, exact: &ExactPacket, count: usize) -> RayPacket {
         let live = Mask8::from_bits((1u32 << count) - 1);
-        let origin = match self.common_origin() {
-            Some(origin) => Vec3x8::splat(origin),
-            None => rounded(&exact.origin),
-        };
+        let origin = self.common.map_or_else(|| rounded(&exact.origin), Vec3x8::splat);
         RayPacket::new(origin, rounded(&exact.dir), float8(f32::INFINITY), live)
     }
 
     /// Points of the picture in pixels: x, y.
     #[inline(always)]
     pub fn points(&self, samples: &Samples8) -> [[f64; LANES]; 2] {
-        let mut points = [samples.x, samples.y].map(|axis| axis.map(|pixel| f64::from(pixel) + 0.5));
+        let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
+            x[lane] = f64::from(samples.x[lane]) + 0.5;
+            y[lane] = f64::from(samples.y[lane]) + 0.5;
+        }
         if self.centered {
-            return points;
+            return [x, y];
         }
-        for (axis, bits) in points.iter_mut().zip(samples.pattern.sample(&samples.index)) {
-            for lane in 0..LANES {
-                axis[lane] += self.filter.offset(bits[lane]);
-            }
+        let [u, v] = samples.pattern.sample(&samples.index);
+        let off = [self.filter.offsets(&u), self.filter.offsets(&v)];
+        for lane in 0..LANES {
+            x[lane] += off[0][lane];
+            y[lane] += off[1][lane];
         }
-        points
+        [x, y]
     }
+}
+
+/// An axis of what changes by `base[1]` and `base[2]` a pixel right and down.
+#[inline(always)]
+fn affine(base: &[DVec3; 3], k: usize, points: &[[f64; LANES]; 2]) -> [f64; LANES] {
+    let (start, right, down) = (base[0][k], base[1][k], base[2][k]);
+    let mut axis = [0.0; LANES];
+    for lane in 0..LANES {
+        axis[lane] = start + right * points[0][lane] + down * points[1][lane];
+    }
+    axis
 }
 
 /// The sample patterns of one pixel.
@@ -166,6 +172,17 @@ impl Samples8 {
         (self.x[lane], self.y[lane], self.index[lane]) = (x, y, index);
         self.key[lane] = pattern.key;
         self.pattern.set(lane, pattern.filter);
+    }
+}
+
+impl Samples8 {
+    /// Sets eight samples of one pixel, from the index `first` on.
+    #[inline(always)]
+    pub fn set_all(&mut self, (x, y): (i32, i32), pattern: PixelPattern, first: u32) {
+        let mut index = [first; LANES];
+        (0..LANES).for_each(|lane| index[lane] += lane as u32);
+        let (key, pattern) = ([pattern.key; LANES], Pattern8::splat(pattern.filter));
+        *self = Samples8 { x: [x; LANES], y: [y; LANES], key, pattern, index };
     }
 }
 

@@ -10,7 +10,7 @@ use super::camera::Samples8;
 use super::hits::{Exact, Shaded};
 use super::lamps::Lamps;
 use super::record::{RayCounts, RayKind, Record};
-use super::wave::{WAVE, Wave};
+use super::wave::{Branch, WAVE, Wave};
 use crate::accel::{PACKETS, Tile, Tree, Walk};
 use crate::lanes::{Float8, LANES, Mask8, Vec3x8, bits, float8};
 use crate::plan::{LeftOut, Plan, Skip};
@@ -28,6 +28,8 @@ pub struct Direct<'s> {
     ambient: Option<Vec3x8>,
     pub(super) lamps: &'s Lamps<'s>,
     pub(super) settings: RenderSettings,
+    /// Some light has primitives that nothing can put in its shadow.
+    pub(super) frees: bool,
 }
 
 /// Radiance and alpha of samples, by packet.
@@ -54,6 +56,8 @@ pub struct Room {
     pub samples: Samples,
     /// What numbers the samples since then draw, by packet, where [`Direct::draws`] any.
     pub seeds: Vec<Samples8>,
+    /// Later rays.
+    tiles: Vec<Tile>,
     shadows: Box<Tile>,
     shaded: Vec<Shaded>,
     exact: Vec<Exact>,
@@ -81,6 +85,7 @@ impl Default for Room {
             wave: Box::new(Wave::empty()),
             samples: Samples::default(),
             seeds: Vec::new(),
+            tiles: Vec::new(),
             shadows: Box::new(Tile::empty()),
             shaded: vec![Shaded::NOTHING; PACKETS],
             exact: Vec::new(),
@@ -121,6 +126,7 @@ impl<'s> Direct<'s> {
             ambient: is_needed.then(|| Vec3x8::splat(ambient)),
             lamps,
             settings,
+            frees: plan.unshadowed.iter().any(Option::is_some),
         }
     }
 
@@ -140,9 +146,34 @@ impl<'s> Direct<'s> {
     }
 
     /// Traces the camera rays of the wave, which where [`Direct::goes_on`] keep what they were before they were
-    /// rounded. What goes on from them waits for [`Direct::trace_later`].
-    pub fn trace_camera<R: Record>(&self, room: &mut Room, record: &mut R) {
-        self.trace(room, record);
+    /// rounded; without `sees` it is known that they meet no primitive. What goes on from them waits for
+    /// [`Direct::trace_later`].
+    pub fn trace_camera<R: Record>(&self, sees: bool, room: &mut Room, record: &mut R) {
+        let (kind, count) = (RayKind::Camera as usize, room.wave.count());
+        if sees {
+            let redecided = room.walk.counts.redecided;
+            self.tree.closest_tiles(from_mut(&mut room.wave.tile), &mut room.walk);
+            room.rays.rays[kind] += count;
+            room.rays.redecided[kind] += room.walk.counts.redecided - redecided;
+        } else {
+            room.left_out[Skip::Background] += count;
+        }
+        self.light(room, record);
+    }
+
+    /// Radiance and alpha of camera rays that meet no primitive, where they are all the same.
+    pub fn blank(&self) -> Option<[f32; 4]> {
+        if self.lamps.are_seen() {
+            return None;
+        }
+        match (self.plan.scene.background.transparent, &self.backdrop) {
+            (true, _) => Some([0.0; 4]),
+            (false, Backdrop8::Color(color)) => {
+                let [r, g, b] = color.lane(0);
+                Some([r, g, b, 1.0])
+            }
+            (false, Backdrop8::Gradient(..) | Backdrop8::Image(..)) => None,
+        }
     }
 
     /// Traces what goes on from the camera rays since [`Room::begin`], depth by depth, so that few of the tiles are
@@ -152,10 +183,13 @@ impl<'s> Direct<'s> {
             let later = std::mem::take(&mut room.later);
             let kinds = [RayKind::Reflection, RayKind::Refraction, RayKind::Bounce];
             for (kind, branches) in kinds.into_iter().zip(later) {
-                for branches in branches.chunks(WAVE) {
-                    room.wave.fill(branches, kind, depth);
-                    self.trace(room, record);
+                self.find_later(&branches, kind, room);
+                let mut tiles = std::mem::take(&mut room.tiles);
+                for (branches, tile) in branches.chunks(WAVE).zip(&mut tiles) {
+                    room.wave.fill(tile, branches, kind, depth);
+                    self.light(room, record);
                 }
+                room.tiles = tiles;
             }
             if room.later.iter().all(Vec::is_empty) {
                 break;
@@ -164,13 +198,23 @@ impl<'s> Direct<'s> {
         room.later.iter_mut().for_each(Vec::clear);
     }
 
-    fn trace<R: Record>(&self, room: &mut Room, record: &mut R) {
-        let Room { walk, rays, left_out, wave, samples, seeds, shadows, shaded, exact, later } = room;
+    /// Finds what later rays meet, all together.
+    fn find_later(&self, branches: &[Branch], kind: RayKind, room: &mut Room) {
+        room.tiles.resize_with(branches.len().div_ceil(WAVE), Tile::empty);
+        for (branches, tile) in branches.chunks(WAVE).zip(&mut room.tiles) {
+            Branch::set_tile(branches, tile);
+        }
+        let redecided = room.walk.counts.redecided;
+        self.tree.closest_tiles(&mut room.tiles, &mut room.walk);
+        room.rays.rays[kind as usize] += branches.len() as u64;
+        room.rays.redecided[kind as usize] += room.walk.counts.redecided - redecided;
+    }
+
+    /// Shades what the rays of the wave met.
+    fn light<R: Record>(&self, room: &mut Room, record: &mut R) {
+        let Room { walk, rays, left_out, wave, samples, seeds, shadows, shaded, exact, later, .. } = room;
         let kind = wave.kind as usize;
         let live: [u32; PACKETS] = std::array::from_fn(|p| wave.tile.packets[p].live().bits());
-        let redecided = walk.counts.redecided;
-        self.tree.closest_tiles(from_mut(&mut wave.tile), walk);
-        rays.redecided[kind] += walk.counts.redecided - redecided;
         let wave = &**wave;
         let mut radiance = [Vec3x8::ZERO; PACKETS];
         let mut seen = 0;
@@ -183,7 +227,6 @@ impl<'s> Direct<'s> {
         };
         for (p, live) in live.into_iter().enumerate().filter(|(_, live)| *live != 0) {
             let hit = live & wave.tile.met(p).bits();
-            rays.rays[kind] += u64::from(live.count_ones());
             rays.hits[kind] += u64::from(hit.count_ones());
             rays.packets[kind] += 1;
             if R::ON {

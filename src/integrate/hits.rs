@@ -26,6 +26,8 @@ pub struct Shaded {
     /// Lanes whose shading normal is interpolated.
     pub smooth: Mask8,
     pub bsdf: Bsdf8,
+    /// Whose they are, where some light has primitives that nothing can put in its shadow.
+    pub primitives: [u32; LANES],
 }
 
 /// One hit in f64, as rays go on from it.
@@ -51,17 +53,21 @@ impl Direct<'_> {
     ) {
         let (rays, stores) = (&wave.tile.packets[p], self.tree.stores());
         let (mut surface, owners) = stores.surface::<false>(wave.tile.hits[p], rays, rays.t_max);
+        let owners = &owners;
         let first = exact.len();
         if self.goes_on() {
-            self.refine(wave, (p, hit), &owners, &mut surface, exact);
+            self.refine(wave, (p, hit), owners, &mut surface, exact);
         }
         let front = Mask8::sign(surface.normal.dot(rays.dir));
-        let materials = self.materials_of(&owners, front.bits(), hit);
+        let materials = self.materials_of(owners, front.bits(), hit);
         shaded.packet = p;
         shaded.hit = hit;
         shaded.front = front;
         shaded.point = surface.point;
         shaded.error = surface.error;
+        if self.frees {
+            shaded.primitives = owners.map(|owner| owner.primitive);
+        }
         if self.plan.shines {
             shaded.wo = -rays.dir.normalize();
         }
@@ -72,13 +78,13 @@ impl Direct<'_> {
         exact[first..].iter_mut().for_each(|exact| exact.material = materials[exact.lane]);
         let all = !self.plan.skips.allows(Skip::Shading);
         if self.plan.textured || self.plan.colored || all {
-            self.add_colors((wave, p), &owners, &materials, shaded, record);
+            self.add_colors((wave, p), owners, &materials, shaded, record);
         }
         if self.plan.smooth || all {
-            self.add_normals(&owners, shaded, &mut exact[first..]);
+            self.add_normals(owners, shaded, &mut exact[first..]);
         }
         if R::SURFACES && wave.depth == 1 {
-            let (rows, owners, materials) = (wave.tile.hits[p], &owners, &materials);
+            let (rows, owners, materials) = (wave.tile.hits[p], owners, &materials);
             let (normal, bsdf) = (shaded.n_s, &shaded.bsdf);
             record.surface(&Seen { packet: p, hit, rays, rows, owners, materials, normal, bsdf });
         }
@@ -193,6 +199,7 @@ impl Shaded {
         n_s: Vec3x8::ZERO,
         smooth: Mask8::NONE,
         bsdf: Bsdf8::NOTHING,
+        primitives: [0; LANES],
     };
 
     /// The hit points moved off the surface, to the viewer's side or the other one.

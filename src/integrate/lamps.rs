@@ -75,6 +75,11 @@ impl Lamps<'_> {
     pub(super) fn draws(&self) -> bool {
         !self.areas.is_empty() || self.sky.is_some()
     }
+
+    /// Whether camera, mirrors and glass may see any.
+    pub(super) fn are_seen(&self) -> bool {
+        self.seen.is_some()
+    }
 }
 
 /// Numbers for the samples of a packet of a wave.

@@ -8,7 +8,7 @@ use super::record::{RayKind, Record};
 use super::wave::Wave;
 use crate::accel::PACKETS;
 use crate::lanes::{Float8, Mask8, RayPacket, UNIT_ROUNDOFF, Vec3x8, bits, float8};
-use crate::plan::Skip;
+use crate::plan::{LEAST_COSINE, Skip};
 use crate::shade::{Illumination, Toward};
 
 /// What one light gives to the hits of a wave.
@@ -33,6 +33,9 @@ impl Direct<'_> {
         sink: &mut Sink<R>,
     ) {
         let mut shares = self.shares(light, wave, hits, sink);
+        if let Some(free) = &self.plan.unshadowed[*index] {
+            leave_out_free(free, light, hits, &mut shares, sink);
+        }
         if light.shadows {
             self.cast_shadows((*index, light), wave, hits, &mut shares, sink);
         } else if R::ON {
@@ -80,7 +83,7 @@ impl Direct<'_> {
         shares: &mut Shares,
         sink: &mut Sink<R>,
     ) {
-        if shares.cast == [0; PACKETS] {
+        if shares.cast == [0; PACKETS] && !R::ON {
             return;
         }
         let tile = &mut *sink.shadows;
@@ -118,13 +121,32 @@ impl Direct<'_> {
             sink.rays.hits[RayKind::Shadow as usize] += u64::from((cast & !bright).count_ones());
             sink.rays.packets[RayKind::Shadow as usize] += u64::from(cast != 0);
             if let Some(packets) = &told {
-                for i in bits(*lit) {
+                for i in bits(*lit & !cast) {
+                    sink.record.lit(index, wave.slot(p, i), wave.path(p, i));
+                }
+                for i in bits(*lit & cast) {
                     let dark = bright >> i & 1 == 0;
                     sink.record.shadow(index, packets[p].lane(i), dark, wave.slot(p, i), wave.path(p, i));
                 }
             }
-            *lit &= bright;
+            *lit &= bright | !cast;
         }
+    }
+}
+
+/// Casts no rays from the fronts of primitives that nothing can put in the shadow of this light: from the inside of
+/// one its other side may be in the way. Next to the terminator they are cast all the same: there a surface could seem
+/// to shadow itself.
+fn leave_out_free<R: Record>(free: &[bool], light: &Illumination, hits: Hits, shares: &mut Shares, sink: &mut Sink<R>) {
+    for p in bits(hits.1) {
+        let shaded = &hits.0[p];
+        let (wi, _) = light.sample(shaded.point);
+        let steep = Mask8::gt(shaded.n_g.dot(wi), float8(LEAST_COSINE)).bits() & shares.cast[p];
+        let steep = steep & shaded.front.bits();
+        let is_free = |i: &usize| free[shaded.primitives[*i] as usize];
+        let free: u32 = bits(steep).filter(is_free).map(|i| 1 << i).sum();
+        shares.cast[p] &= !free;
+        sink.left_out[Skip::Occlusion] += u64::from(free.count_ones());
     }
 }
 

@@ -46,6 +46,21 @@ pub(super) struct Branch {
     pub path: u32,
 }
 
+impl Branch {
+    /// Up to 64 of them, as rays.
+    pub fn set_tile(branches: &[Branch], tile: &mut Tile) {
+        tile.renew(None);
+        tile.packets[branches.len().div_ceil(LANES)..].fill(RayPacket::dead());
+        for (packet, branches) in tile.packets.iter_mut().zip(branches.chunks(LANES)) {
+            let lane = |i: usize| &branches[i.min(branches.len() - 1)];
+            let live = Mask8::from_bits((1 << branches.len()) - 1);
+            let origin = Vec3x8::from_fn(|i| lane(i).origin);
+            let dir = Vec3x8::from_fn(|i| lane(i).exact.1.as_vec3().to_array());
+            *packet = RayPacket::new(origin, dir, float8(f32::INFINITY), live);
+        }
+    }
+}
+
 impl Wave {
     /// Dead rays.
     pub fn empty() -> Self {
@@ -68,17 +83,12 @@ impl Wave {
         self.tile.renew(common);
     }
 
-    /// Takes it for up to 64 later rays.
-    pub(super) fn fill(&mut self, branches: &[Branch], kind: RayKind, depth: u32) {
+    /// Takes it for up to 64 later rays, which have been traced.
+    pub(super) fn fill(&mut self, tile: &mut Tile, branches: &[Branch], kind: RayKind, depth: u32) {
         (self.kind, self.depth) = (kind, depth);
-        self.tile.renew(None);
-        self.tile.packets[branches.len().div_ceil(LANES)..].fill(RayPacket::dead());
+        std::mem::swap(&mut self.tile, tile);
         for (p, branches) in branches.chunks(LANES).enumerate() {
             let lane = |i: usize| &branches[i.min(branches.len() - 1)];
-            let live = Mask8::from_bits((1 << branches.len()) - 1);
-            let origin = Vec3x8::from_fn(|i| lane(i).origin);
-            let dir = Vec3x8::from_fn(|i| lane(i).exact.1.as_vec3().to_array());
-            self.tile.packets[p] = RayPacket::new(origin, dir, float8(f32::INFINITY), live);
             self.weight[p] = Vec3x8::from_fn(|i| lane(i).weight);
             self.density[p] = Float8::from(std::array::from_fn::<f32, LANES, _>(|i| lane(i).density));
             for (i, branch) in branches.iter().enumerate() {
@@ -86,6 +96,11 @@ impl Wave {
                 self.exact[p].set_lane(i, branch.exact.0, branch.exact.1);
             }
         }
+    }
+
+    /// How many rays there are.
+    pub fn count(&self) -> u64 {
+        self.tile.packets.iter().map(|rays| u64::from(rays.live().bits().count_ones())).sum()
     }
 
     /// What of the radiance along the rays of a packet reaches their pixels.

@@ -3,12 +3,14 @@
 
 mod needs;
 mod parts;
+mod reach;
 mod skips;
 mod split;
 mod valid;
 
 use glam::DVec3;
 
+pub use self::reach::{LEAST_COSINE, Sight};
 pub use self::skips::{LeftOut, Skip, SkipSet, Skipped, Skips};
 pub use self::valid::{InvalidScene, validate};
 
@@ -16,7 +18,7 @@ use self::needs::Needs;
 pub use self::parts::{
     BoxPart, ConePart, CylinderPart, DiskPart, Kind, Owner, Parts, PlanePart, PolygonPart, SpherePart, TurnedBoxPart,
 };
-use crate::scene::{Aov, Layers, Material, Scene, Visible};
+use crate::scene::{Aov, Integrator, Layers, Lens, Material, Object, Scene, Shape, Visible};
 
 /// Decisions about one scene seen from one origin.
 #[derive(Debug)]
@@ -45,9 +47,16 @@ pub struct Plan<'s> {
     pub goes_on: Vec<bool>,
     /// By light: whether it is to be asked at all.
     pub lights: Vec<bool>,
+    /// By light: the primitives that nothing can put in its shadow, where there are any.
+    pub unshadowed: Vec<Option<Vec<bool>>>,
+    /// By primitive: whether it takes part; `None`: all do.
+    needed: Option<Vec<bool>>,
     /// What is left out, and why.
     pub skips: Skips,
 }
+
+/// Most primitives for which a straight loop is faster than a tree.
+const FEW: usize = 6;
 
 impl<'s> Plan<'s> {
     /// Plans for rays that are given relative to `origin`; all that is not needed is left out.
@@ -63,14 +72,35 @@ impl<'s> Plan<'s> {
         let needs = Needs::of(scene);
         let mut skips = Skips::new(allowed);
         needs.decide(scene, &mut skips);
+        let unshadowed = match skips.allows(Skip::Occlusion) {
+            true => reach::unshadowed(scene, &needs.lights, origin, &mut skips),
+            false => vec![None; scene.lights.len()],
+        };
+        let count = scene.primitive_count();
+        let why = || format!("a straight loop over {count} primitives is faster");
+        skips.decide(Skip::Tree, 0, (1..=FEW).contains(&count).then(why));
         let lights = needs.lights.iter().map(|needed| *needed || !skips.allows(Skip::Lights)).collect();
         let goes_on =
             |side: &[u32; 2]| side.iter().any(|material| scene.materials[*material as usize].model.scatters());
         let goes_on = sides.iter().map(goes_on).collect();
         let textured = needs.textures.contains(&true);
         let Needs { colored, smooth, shines, scatters, .. } = needs;
-        let mut plan =
-            Plan { scene, origin, visible, sides, colored, smooth, textured, shines, scatters, goes_on, lights, skips };
+        let mut plan = Plan {
+            scene,
+            origin,
+            visible,
+            sides,
+            colored,
+            smooth,
+            textured,
+            shines,
+            scatters,
+            goes_on,
+            lights,
+            unshadowed,
+            needed: None,
+            skips,
+        };
         plan.leave_out_layers(scene.layers);
         plan
     }
@@ -82,9 +112,27 @@ impl<'s> Plan<'s> {
         self.skips.decide(Skip::Layers, unasked.len() as u64, (!unasked.is_empty()).then(why));
     }
 
+    /// Leaves out what only matters beside the pixels that are asked for.
+    pub fn look(&mut self, sight: &Sight) {
+        let is_plane = |object: &Object| matches!(object.shape, Shape::Plane(_));
+        let is_straight = match sight.camera.lens {
+            Lens::Pinhole { .. } | Lens::Orthographic { .. } => true,
+            Lens::ThinLens { .. } | Lens::Panoramic => false,
+        };
+        let bounded = is_straight && !self.scene.objects.iter().any(is_plane);
+        let why = || "outside of what the boxes around all primitives cover there is nothing else".to_owned();
+        self.skips.decide(Skip::Background, 0, bounded.then(why));
+        if sight.integrator == Integrator::Path {
+            self.skips.decide(Skip::Bounces, 0, None);
+        }
+        if !self.scatters {
+            self.needed = reach::needed(self.scene, &self.lights, sight, &mut self.skips);
+        }
+    }
+
     /// All parts of the scene, relative to the origin.
     pub fn parts(&self) -> Parts {
-        Parts::new(self.scene, self.origin)
+        Parts::new(self.scene, self.origin, self.needed.as_deref())
     }
 
     /// The material of the side that a ray met.

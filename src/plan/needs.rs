@@ -1,7 +1,8 @@
 //! What the materials in use, the lights and the clouds of a scene ask for.
 
+use super::reach;
 use super::skips::{Skip, Skips};
-use crate::scene::{CloudMaterial, Model, Object, Paint, Scene, Shape};
+use crate::scene::{CloudMaterial, Model, Object, Paint, Scene, Shape, Source};
 
 /// Features of a scene, as far as something shows them.
 #[derive(Debug)]
@@ -38,17 +39,16 @@ impl Needs {
             scatters: models().any(Model::scatters),
             shines: models().any(|model| matches!(model, Model::Phong { ks, .. } if *ks > 0.0)),
             textures,
-            lights: scene.lights.iter().map(|light| lit && !light.source.is_dark()).collect(),
+            lights: scene.lights.iter().map(|light| lit && reaches(&light.source, scene)).collect(),
         }
     }
 
     /// What of all this may be left out.
     pub fn decide(&self, scene: &Scene, skips: &mut Skips) {
         let dark = self.lights.iter().filter(|needed| !**needed).count();
-        let why = match scene.lights.iter().all(|light| light.source.is_dark()) {
-            true => "they have no power",
-            false if self.lights.iter().any(|needed| *needed) => "some have no power",
-            false => "nothing in the scene takes light directly",
+        let why = match scene.lights.iter().any(|light| reaches(&light.source, scene)) {
+            true if !self.lights.contains(&true) => "nothing in the scene takes light directly",
+            _ => "they have no power, or their cones meet nothing",
         };
         skips.decide(Skip::Lights, dark as u64, (dark > 0).then(|| why.to_owned()));
         let why = "lights behind a surface or out of range give nothing, in shadow or not";
@@ -73,6 +73,10 @@ impl Needs {
         let why = || format!("no material in use asks for {}", missing.join(", "));
         skips.decide(Skip::Shading, 0, (!missing.is_empty()).then(why));
     }
+}
+
+fn reaches(source: &Source, scene: &Scene) -> bool {
+    !source.is_dark() && reach::meets_anything(source, scene)
 }
 
 /// Materials that some primitive shows, their backs among them.

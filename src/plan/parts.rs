@@ -230,11 +230,13 @@ pub struct Parts {
 }
 
 impl Parts {
-    /// Takes a scene apart, relative to `origin`.
-    pub fn new(scene: &Scene, origin: DVec3) -> Self {
+    /// Takes a scene apart, relative to `origin`; of `needed`, by primitive, only what is true.
+    pub fn new(scene: &Scene, origin: DVec3, needed: Option<&[bool]>) -> Self {
         let mut parts = Parts::default();
         for (index, primitive) in scene.primitives().enumerate() {
-            parts.add(&primitive, index as u32, origin);
+            if needed.is_none_or(|needed| needed[index]) {
+                parts.add(&primitive, index as u32, origin);
+            }
         }
         parts
     }

@@ -10,8 +10,16 @@ use serde::Serialize;
 /// A kind of work that may be left out. With or without, a picture is the same to the bit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Skip {
+    /// The tree, where there is little to be met.
+    Tree,
+    /// Camera rays that can only see the background.
+    Background,
+    /// Primitives that reach no pixel.
+    Objects,
     /// Lights that give nothing to anything in the scene.
     Lights,
+    /// Shadow rays where nothing can stand in the way.
+    Occlusion,
     /// Shadow rays where a light gives nothing whether something is in its way or not.
     Shadows,
     /// Rays that go on from hits, and all that they need of these.
@@ -25,8 +33,12 @@ pub enum Skip {
 }
 
 /// Each kind with its name, and the word for what is counted of it; none where nothing is.
-const ROWS: [(Skip, &str, Option<&str>); 6] = [
+const ROWS: [(Skip, &str, Option<&str>); 10] = [
+    (Skip::Tree, "tree", None),
+    (Skip::Background, "background", Some("camera rays")),
+    (Skip::Objects, "objects", Some("primitives")),
     (Skip::Lights, "lights", Some("lights")),
+    (Skip::Occlusion, "occlusion", Some("shadow rays")),
     (Skip::Shadows, "shadows", Some("shadow rays")),
     (Skip::Bounces, "bounces", None),
     (Skip::Shading, "shading", None),

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::adaptive::{Effort, Noise};
+use super::coverage::Coverage;
 use super::layers::LayerWork;
 use crate::accel::{Counts, PACKETS};
 use crate::film::{Picture, Window};
@@ -10,8 +11,8 @@ use crate::integrate::{
     CameraRays, Direct, PixelPattern, RayCounts, RayKind, Record, Room, Samples, Samples8, Silent, Summed, Taken, WAVE,
     Wave,
 };
-use crate::lanes::LANES;
-use crate::plan::LeftOut;
+use crate::lanes::{LANES, Vec3x8};
+use crate::plan::{LeftOut, Skip};
 
 /// Pixels along an edge.
 const EDGE: i32 = 32;
@@ -76,35 +77,51 @@ impl Block {
         Block::new(Window { x0, y0, x1: x0 + EDGE, y1: y0 + EDGE })
     }
 
+    /// The smallest window of whole squares around another.
+    pub fn hull(window: Window) -> Window {
+        let [low, high] = [|at: i32| at.div_euclid(EDGE) * EDGE, |at: i32| -(-at).div_euclid(EDGE) * EDGE];
+        Window { x0: low(window.x0), y0: low(window.y0), x1: high(window.x1), y1: high(window.y1) }
+    }
+
     /// Some samples of all pixels, and their means: pixels along a Z curve, the samples of one after another, 64 at a time.
     /// So a tile is as square as the number of samples allows, and each pixel sums in sample order.
     /// `None` where `stop` asked for that within.
     pub fn trace<R: Record>(
         &self,
-        rays: &CameraRays,
+        view: &View,
         direct: &Direct,
         range: Range<u32>,
         record: &mut R,
         stop: impl Fn() -> bool,
     ) -> Option<BlockWork> {
-        let window = self.window;
+        let (window, View { rays, coverage }) = (self.window, *view);
         let sums = vec![[0f64; 4]; window.area()];
+        let blank = if R::ON || R::SURFACES { None } else { direct.blank().filter(|_| coverage.is_some()) };
         let before = (Counts::default(), RayCounts::default());
         let room = Room::default();
         let mut work = Work { rays, direct, record, sums, room, before, tiles: 0, background_tiles: 0 };
-        let mut batch = Batch::default();
+        let (mut batch, mut blank_samples) = (Batch::default(), 0);
         for code in 0..(EDGE * EDGE) as u32 {
             let (x, y) = (window.x0 + compact(code), window.y0 + compact(code >> 1));
             let Some(index) = window.index(x, y) else { continue };
             if code % 32 == 0 && stop() {
                 return None;
             }
+            let sees = coverage.is_none_or(|coverage| coverage.sees(x, y));
+            if let (false, Some(blank)) = (sees, &blank) {
+                // So many equal numbers of 24 bits sum up exactly.
+                work.sums[index] = blank.map(|x| f64::from(x) * range.len() as f64);
+                blank_samples += range.len() as u64;
+                continue;
+            }
+            batch.sees |= sees;
             let pattern = rays.pattern(x, y);
             let mut sample = range.start;
             while sample < range.end {
                 sample = batch.push((x, y), pattern, sample..range.end, index);
                 if batch.count == WAVE {
                     work.tile(&mut batch);
+                    batch.sees = sees && sample < range.end;
                 }
             }
         }
@@ -112,8 +129,10 @@ impl Block {
         work.finish(&mut batch);
         let share = 1.0 / range.len() as f64;
         let pixels = work.sums.into_iter().map(|sum| sum.map(|x| (x * share) as f32)).collect();
-        let (tiles, background_tiles) = (work.tiles, work.background_tiles);
-        let Room { walk, rays, left_out, .. } = work.room;
+        let blank_tiles = blank_samples.div_ceil(WAVE as u64);
+        let (tiles, background_tiles) = (work.tiles + blank_tiles, work.background_tiles + blank_tiles);
+        let Room { walk, rays, mut left_out, .. } = work.room;
+        left_out[Skip::Background] += blank_samples;
         Some(BlockWork {
             pixels,
             layers: None,
@@ -134,11 +153,11 @@ impl Block {
     }
 
     /// The square that it is a part of, sampled until it is good enough, while a record looks on with the first
-    /// samples; all is of that square. `rays` are those of each half of the samples.
+    /// samples; all is of that square. `views` are those of each half of the samples.
     pub fn trace_until<R: Record>(
         &self,
         noise: &Noise,
-        rays: [&CameraRays; 2],
+        views: [View; 2],
         direct: &Direct,
         record: &mut R,
         stop: &(dyn Fn() -> bool + Sync),
@@ -147,13 +166,13 @@ impl Block {
         let mut sum: Option<BlockWork> = None;
         let draw = |half: usize, range: Range<u32>| match &mut sum {
             None => {
-                let mut work = whole.trace(rays[half], direct, range, record, stop)?;
+                let mut work = whole.trace(&views[half], direct, range, record, stop)?;
                 let pixels = std::mem::take(&mut work.pixels);
                 sum = Some(work);
                 Some(pixels)
             }
             Some(sum) => {
-                let work = whole.trace(rays[half], direct, range, &mut Silent, stop)?;
+                let work = whole.trace(&views[half], direct, range, &mut Silent, stop)?;
                 sum.absorb(&work);
                 Some(work.pixels)
             }
@@ -182,6 +201,14 @@ impl Block {
     }
 }
 
+/// What all blocks of a picture have in common.
+#[derive(Clone, Copy)]
+pub struct View<'a> {
+    pub rays: &'a CameraRays,
+    /// What of the picture may see anything; without, all of it.
+    pub coverage: Option<&'a Coverage>,
+}
+
 /// Work on a block.
 struct Work<'a, 's, R: Record> {
     rays: &'a CameraRays,
@@ -205,6 +232,8 @@ struct Batch {
     traced: usize,
     /// Squares of the waiting samples' distances from the centres of their pixels, where a record wants them.
     distances: [[f64; LANES]; PACKETS],
+    /// Whether the samples that wait may see anything but the background.
+    sees: bool,
 }
 
 impl<R: Record> Work<'_, '_, R> {
@@ -221,10 +250,10 @@ impl<R: Record> Work<'_, '_, R> {
         if self.direct.draws() {
             self.room.seeds.extend(batch.samples);
         }
-        self.direct.trace_camera(&mut self.room, self.record);
+        self.direct.trace_camera(batch.sees, &mut self.room, self.record);
         if R::SURFACES {
             let (tests, rays) = self.news();
-            let Batch { samples, count, pixels, traced, distances } = &*batch;
+            let Batch { samples, count, pixels, traced, distances, .. } = &*batch;
             self.record.taken(&Taken {
                 count: *count,
                 samples,
@@ -277,9 +306,13 @@ impl Batch {
         }
         let Some(pixels) = self.pixels.last_mut() else { return samples.end };
         let count = LANES.min(lane + samples.len()) - lane;
-        for (lane, sample) in (lane..lane + count).zip(samples.start..) {
-            self.samples[p].set(lane, place, pattern, sample);
-            pixels[lane] = pixel as u32;
+        if count == LANES {
+            self.samples[p].set_all(place, pattern, samples.start);
+        } else {
+            for (lane, sample) in (lane..lane + count).zip(samples.start..) {
+                self.samples[p].set(lane, place, pattern, sample);
+                pixels[lane] = pixel as u32;
+            }
         }
         self.count += count;
         samples.start + count as u32
@@ -295,25 +328,34 @@ impl Batch {
         let count = |p: usize| all.saturating_sub(p * LANES).min(LANES);
         for (p, samples) in self.samples.iter().enumerate() {
             let points = rays.points(samples);
-            let exact = rays.exact_at(samples, &points);
             if R::SURFACES {
                 self.distances[p] = samples.distances(&points);
             }
-            wave.tile.packets[p] = rays.packet(&exact, count(p));
-            wave.tile.exact_mut()[p] = exact;
+            let exact = &mut wave.tile.exact_mut()[p];
+            *exact = rays.exact_at(samples, &points);
             if keep_exact {
-                wave.exact[p] = exact;
+                wave.exact[p] = *exact;
             }
+            let packet = rays.packet(exact, count(p));
+            wave.tile.packets[p] = packet;
         }
     }
 
     fn add_to(&self, samples: &Samples, sums: &mut [[f64; 4]]) {
         for (p, pixels) in self.pixels.iter().enumerate() {
-            let (colors, alphas) = (samples.radiance[p].to_arrays(), samples.alpha[p].to_array());
-            for i in 0..LANES.min(self.traced - p * LANES) {
-                let [r, g, b] = colors[i].map(f64::from);
-                let sum = &mut sums[pixels[i] as usize];
-                *sum = [sum[0] + r, sum[1] + g, sum[2] + b, sum[3] + f64::from(alphas[i])];
+            let Vec3x8 { x, y, z } = samples.radiance[p];
+            let columns = [x, y, z, samples.alpha[p]].map(|column| column.to_array());
+            let count = LANES.min(self.traced - p * LANES);
+            if count == LANES && *pixels == [pixels[0]; LANES] {
+                let sum = &mut sums[pixels[0] as usize];
+                for k in 0..4 {
+                    sum[k] = columns[k].iter().fold(sum[k], |sum, x| sum + f64::from(*x));
+                }
+                continue;
+            }
+            for (i, pixel) in pixels.iter().enumerate().take(count) {
+                let sum = &mut sums[*pixel as usize];
+                (0..4).for_each(|k| sum[k] += f64::from(columns[k][i]));
             }
         }
     }

@@ -2,6 +2,7 @@
 
 mod adaptive;
 mod block;
+mod coverage;
 mod layers;
 mod query;
 mod reference;
@@ -24,14 +25,15 @@ pub use self::stats::Stats;
 pub use self::task::{Task, Traced};
 
 use self::adaptive::Noise;
-use self::block::Block;
+use self::block::{Block, View};
+use self::coverage::Coverage;
 use crate::accel::Tree;
 use crate::film::{Picture, Window};
 use crate::integrate::{CameraRays, Direct, Lamps, RayCounts, Record};
 use crate::output::{self, Description, Losses, Options, OutputError};
-use crate::plan::{InvalidScene, Plan, SkipSet, validate};
+use crate::plan::{InvalidScene, Plan, Sight, Skip, SkipSet, validate};
 use crate::sample;
-use crate::scene::{Camera, ImageSettings, Integrator, Layers, RenderSettings, Scene};
+use crate::scene::{Aov, Camera, ImageSettings, Integrator, Layers, RenderSettings, Scene};
 
 /// Which tracer finds the hits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -324,6 +326,27 @@ impl<'s> Renderer<'s> {
         self.scene.hash(&format!("{settings:?}"))
     }
 
+    /// What this render does and what it leaves out.
+    pub fn plan(&self) -> Plan<'s> {
+        let mut plan = Plan::leaving_out(self.skips, self.scene, self.camera.eye);
+        let display = (self.image.width, self.image.height);
+        plan.leave_out_layers(self.layers);
+        let full = Window::full(display).grown(self.overscan);
+        // What a pixel costs must not depend on a crop.
+        let window = self.window.filter(|_| !self.layers.has(Aov::Cost)).unwrap_or(full);
+        // Whole squares are sampled to a noise level, and for costs.
+        let is_whole = self.settings.noise.is_some() || self.layers.has(Aov::Cost);
+        let Window { x0, y0, x1, y1 } = if is_whole { Block::hull(window) } else { window };
+        let (window, integrator) = ([x0, y0, x1, y1], self.settings.integrator);
+        plan.look(&Sight { camera: self.camera, display, window, reach: self.reach(), integrator });
+        plan
+    }
+
+    /// How far camera rays are from the centres of their pixels, at most.
+    fn reach(&self) -> f64 {
+        if self.image.spp == 1 && self.settings.noise.is_none() { 0.0 } else { self.image.filter.radius }
+    }
+
     /// Renders the picture.
     pub fn render(&self, progress: &dyn Progress) -> Result<Rendering, RenderError> {
         self.checked_window()?;
@@ -390,6 +413,7 @@ pub struct Frame<'s> {
     plan: Plan<'s>,
     tree: Tree,
     lamps: Lamps<'s>,
+    coverage: Option<Coverage>,
     rays: CameraRays,
     /// Those of the other half of the samples, to a noise level.
     other_rays: CameraRays,
@@ -406,27 +430,30 @@ impl<'s> Frame<'s> {
     /// Plans and builds.
     pub fn prepare(renderer: &Renderer<'s>) -> Self {
         let start = Instant::now();
-        let mut plan = Plan::leaving_out(renderer.skips, renderer.scene, renderer.camera.eye);
-        plan.leave_out_layers(renderer.layers);
-        let parts = plan.parts();
+        let plan = renderer.plan();
         let plan_seconds = start.elapsed().as_secs_f64();
-        let tree =
-            Tree::new(parts, &plan.visible).certify(renderer.certify).one_by_one(renderer.engine == Engine::Single);
+        let single = renderer.engine == Engine::Single;
+        let tree = Tree::planned(&plan).certify(renderer.certify).one_by_one(single);
         let lamps = Lamps::new(&plan, renderer.settings.integrator);
-        let build_seconds = start.elapsed().as_secs_f64() - plan_seconds;
         let image = &renderer.image;
-        let display = (image.width, image.height);
+        let (display, camera) = ((image.width, image.height), renderer.camera);
+        let coverage = match plan.skips.leaves_out(Skip::Background) {
+            true => Coverage::new(&tree, camera, plan.origin, display, renderer.reach()),
+            false => None,
+        };
+        let build_seconds = start.elapsed().as_secs_f64() - plan_seconds;
         let seed = renderer.settings.seed;
         let noise = renderer.noise_level();
         // A single sample would sit at the centre.
         let spp = if noise.is_some() { image.spp.max(2) } else { image.spp };
-        let rays = |seed| CameraRays::new(renderer.camera, plan.origin, display, image.filter, spp, seed);
+        let rays = |seed| CameraRays::new(camera, plan.origin, display, image.filter, spp, seed);
         let (rays, other_rays) = (rays(seed), rays(sample::other_seed(seed)));
-        let (settings, axis) = (renderer.settings.clone(), renderer.camera.view_axis());
+        let (settings, axis) = (renderer.settings.clone(), camera.view_axis());
         Frame {
             plan,
             tree,
             lamps,
+            coverage,
             rays,
             other_rays,
             noise,
@@ -455,8 +482,17 @@ impl<'s> Frame<'s> {
 
     /// Traces one block on this thread, as a render does, while a record looks on: its pixels row by row.
     pub fn trace_block<R: Record>(&self, block: Window, record: &mut R) -> (Vec<[f32; 4]>, RayCounts) {
-        let work = Block::new(block).trace(&self.rays, &self.direct(), 0..self.spp, record, || false);
+        let work = Block::new(block).trace(&self.view(), &self.direct(), 0..self.spp, record, || false);
         work.map_or_else(Default::default, |work| (work.pixels, work.rays))
+    }
+
+    fn view(&self) -> View<'_> {
+        View { rays: &self.rays, coverage: self.coverage.as_ref() }
+    }
+
+    /// Of each half of the samples, to a noise level.
+    fn views(&self) -> [View<'_>; 2] {
+        [self.view(), View { rays: &self.other_rays, ..self.view() }]
     }
 
     fn direct(&self) -> Direct<'_> {

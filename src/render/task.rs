@@ -160,13 +160,13 @@ impl<'s> Task<'s> {
             return self.trace_until(frame, noise, block, stop);
         }
         let Some(plan) = &self.layers else {
-            return block.trace(&frame.rays, &frame.direct(), 0..self.spp, &mut Silent, stop);
+            return block.trace(&frame.view(), &frame.direct(), 0..self.spp, &mut Silent, stop);
         };
         // What a pixel costs depends on those that are traced with it: they must not depend on a crop.
         let asked_for_cost = plan.layers.has(Aov::Cost) && !self.unasked;
         let whole = if asked_for_cost { block.whole() } else { *block };
         let mut tape = LayerTape::new(frame, plan, whole.window.area());
-        let mut work = whole.trace(&frame.rays, &frame.direct(), 0..self.spp, &mut tape, stop)?;
+        let mut work = whole.trace(&frame.view(), &frame.direct(), 0..self.spp, &mut tape, stop)?;
         work.layers = Some(tape.finish(whole.window));
         if whole.window != block.window {
             block.cut(&whole, &mut work);
@@ -182,12 +182,12 @@ impl<'s> Task<'s> {
         block: &Block,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<BlockWork> {
-        let (whole, direct, rays) = (block.whole(), frame.direct(), [&frame.rays, &frame.other_rays]);
+        let (whole, direct, views) = (block.whole(), frame.direct(), frame.views());
         let mut work = match &self.layers {
-            None => block.trace_until(noise, rays, &direct, &mut Silent, stop)?,
+            None => block.trace_until(noise, views, &direct, &mut Silent, stop)?,
             Some(plan) => {
                 let mut tape = LayerTape::new(frame, plan, whole.window.area());
-                let work = block.trace_until(noise, rays, &direct, &mut tape, stop)?;
+                let work = block.trace_until(noise, views, &direct, &mut tape, stop)?;
                 BlockWork { layers: Some(tape.finish(whole.window)), ..work }
             }
         };

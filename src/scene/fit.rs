@@ -77,6 +77,13 @@ fn tight(balls: &[(DVec3, f64)], center: DVec3, axes: (DVec3, DVec3, DVec3), tan
     View { eye: sideways + eye.z * forward, target: sideways }
 }
 
+impl Shape {
+    /// Adds balls (centre, radius) whose convex hull holds the shape; planes have none.
+    pub fn balls(&self, balls: &mut Vec<(DVec3, f64)>) {
+        bound(self, balls);
+    }
+}
+
 /// Balls that hold a shape; planes have none.
 pub fn bound(shape: &Shape, balls: &mut Vec<(DVec3, f64)>) {
     match shape {
