@@ -83,8 +83,9 @@ fn plane_stands_between(source: &Source, (point, normal): (DVec3, DVec3), to: &B
         Source::Point { position, .. } | Source::Spot { position, .. } => normal.dot(position - point),
         Source::Area { .. } => return true,
     };
+    let side = light * height.signum();
     // NaN: the light comes along the plane.
-    height.abs() <= to.radius + slack || !(light * height.signum() > slack)
+    height.abs() <= to.radius + slack || side.is_nan() || side <= slack
 }
 
 /// Whether a surface whose front faces a light cannot shadow itself.
