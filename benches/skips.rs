@@ -18,6 +18,7 @@ type Row = (&'static str, &'static str, fn() -> Picture);
 
 /// A row a kind.
 const ROWS: &[Row] = &[
+    ("kinds", "`fig5.toml`", || picture(file("fig5.toml"))),
     ("tree", "one sphere", || picture(spheres(1, 1.0))),
     ("background", "2,000 spheres in the middle third", || picture(spheres(2_000, 0.3))),
     ("objects", "100,000 spheres, a crop of 64x64 pixels", || cropped(picture(spheres(100_000, 1.0)))),
@@ -26,6 +27,7 @@ const ROWS: &[Row] = &[
     ("shadows", "2,000 spheres, 8 lights all around", || picture(lights(spheres(2_000, 1.0)))),
     ("bounces", "`fig5.toml`", || picture(file("fig5.toml"))),
     ("shading", "`fig5.toml`", || picture(file("fig5.toml"))),
+    ("layers", "`fig5.toml`", || picture(file("fig5.toml"))),
 ];
 
 /// What is rendered.

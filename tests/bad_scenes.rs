@@ -168,7 +168,9 @@ fn broken_indices_and_polygons_get_their_messages() {
 #[test]
 fn broken_pictures_get_their_messages() {
     let picture = |name: &str, bytes: Vec<u8>| {
-        let scene = format!("format = 1\n[textures.wood]\ntype = \"image\"\nfile = \"{name}\"\n");
+        let shown = "[materials.m]\ntype = \"diffuse\"\nalbedo = { texture = \"wood\" }\n\
+                     [[shapes]]\ntype = \"plane\"\npoint = [0, 0, 0]\nnormal = [0, 1, 0]\nmaterial = \"m\"\n";
+        let scene = format!("format = 1\n[textures.wood]\ntype = \"image\"\nfile = \"{name}\"\n{shown}");
         messages(&[(name, bytes)], &scene)
     };
     let dot = fs::read("tests/bad_scenes/parts/dot.png").unwrap();

@@ -356,7 +356,11 @@ fn pictures_arrive_as_linear_texels() {
     let TextureKind::Checker(tiles) = scene.textures[0].kind else { panic!() };
     assert_eq!((tiles.colors, tiles.scale), ([DVec3::ZERO, dvec3(1., 1., 0.5)], [8.0, 4.0]));
 
-    let plain = read("format = 1\n[textures.photo]\ntype = \"image\"\nfile = \"photo.png\"\n");
+    let plain = read(
+        "format = 1\n[textures.photo]\ntype = \"image\"\nfile = \"photo.png\"\n\
+         [materials.m]\ntype = \"diffuse\"\nalbedo = { texture = \"photo\" }\n\
+         [[shapes]]\ntype = \"plane\"\npoint = [0, 0, 0]\nnormal = [0, 1, 0]\nmaterial = \"m\"\n",
+    );
     let TextureKind::Image(photo) = &plain.textures[0].kind else { panic!() };
     assert_eq!(
         (photo.wrap, photo.filter, photo.color_space),

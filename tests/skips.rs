@@ -90,7 +90,7 @@ fn lit_by_areas(dice: &mut Dice, mut scene: Scene) -> Scene {
         scene.objects.push(object(sphere(scene.cameras[0].eye + dice.in_cube(0.5), 2.0), 0));
     }
     let color = Paint::Color(DVec3::new(0.9, 0.8, 0.7));
-    scene.materials.push(material("mirror", Model::Mirror { reflectance: color.clone() }));
+    scene.materials.push(material("mirror", Model::Mirror { reflectance: color }));
     scene.materials.push(material("glass", Model::Dielectric { ior: 1.5, tint: Paint::Color(DVec3::ONE) }));
     if dice.index(2) == 0 {
         scene.objects.iter_mut().for_each(|object| object.material = dice.index(3));
@@ -135,7 +135,7 @@ fn count(stats: &Stats, name: &str) -> u64 {
 #[test]
 fn random_scenes_are_the_same_with_and_without() {
     let mut dice = Dice(77);
-    let names = ["tree", "background", "objects", "lights", "occlusion", "shadows", "bounces", "shading"];
+    let names = ["kinds", "tree", "background", "objects", "lights", "occlusion", "shadows", "bounces", "shading"];
     let mut found = names.map(|name| (name, 0));
     for round in 0..90 {
         let (few, spread) = (1 + dice.index(9), dice.between(1.0, 5.0));
@@ -159,13 +159,13 @@ fn sampled_light_is_the_same_with_and_without() {
     let mut dice = Dice(1978);
     let names = ["tree", "background", "objects", "lights", "occlusion", "shadows"];
     let mut found = names.map(|name| (name, 0));
-    for round in 0..120 {
+    for round in 0..150 {
         let (few, spread) = (1 + dice.index(9), dice.between(1.0, 5.0));
         let plain = random(&mut dice, few, spread);
         let scene = lit_by_areas(&mut dice, plain);
         let integrator = [Integrator::Direct, Integrator::Path, Integrator::Ao, Integrator::Direct][round % 4];
         let mut renderer = Renderer::new(&scene).expect("complete").threads(1).integrator(integrator).max_depth(4);
-        if round % 3 == 0 {
+        if round % 3 > 0 {
             let (x0, y0) = (dice.index(50) as i32, dice.index(40) as i32);
             renderer = renderer.crop(Window { x0, y0, x1: x0 + 9, y1: y0 + 7 });
         }
@@ -244,6 +244,7 @@ fn what_is_left_out_is_counted() {
     scene.background.backdrop = Backdrop::Color(DVec3::splat(0.25));
     let stats = unchanged(&Renderer::new(&scene).expect("complete").threads(1), "two spheres");
     assert_eq!((count(&stats, "lights"), count(&stats, "objects"), count(&stats, "tree")), (2, 1, 1));
+    assert_eq!(count(&stats, "kinds"), 9);
     let traced = stats.rays.rays[0];
     assert_eq!(count(&stats, "background") + traced, 64 * 64 * 4);
     // The near face of the box around the sphere is 40.3 pixels wide, in cells of four pixels: 48 x 48.
@@ -251,4 +252,46 @@ fn what_is_left_out_is_counted() {
     let (shadow, free, dark) = (stats.rays.rays[1], count(&stats, "occlusion"), count(&stats, "shadows"));
     assert_eq!(shadow + free + dark, stats.rays.hits[0]);
     assert!(free > 100 * shadow.max(1) && dark > 500, "{shadow} {free} {dark}");
+}
+
+/// A lamp whose lit side nothing lies before gives nothing and is seen all the same; from the surfaces that face away from
+/// one that shines, no shadow rays are cast.
+#[test]
+fn lamps_that_shine_away_and_surfaces_that_face_away_cast_no_shadow_rays() {
+    let mut scene = scene_of([sphere(DVec3::ZERO, 1.0)]);
+    let lamp = |height: f64, normal: DVec3| {
+        let emitter = Emitter::Disk { center: DVec3::new(0.0, height, 0.0), normal, radius: 0.5 };
+        light(Source::Area { emitter, radiance: DVec3::splat(7.0), visible: true })
+    };
+    scene.cameras = vec![pinhole(DVec3::new(0.0, 0.0, 9.0), DVec3::ZERO, 40.0)];
+    scene.image = image(80, 80, 4);
+    scene.lights = vec![lamp(2.0, DVec3::Y), lamp(1.1, DVec3::new(0.0, 1.0, 0.02))];
+    let away = unchanged(&Renderer::new(&scene).expect("complete").threads(1), "away");
+    assert_eq!((count(&away, "lights"), away.rays.rays[1]), (2, 0));
+    scene.lights = vec![lamp(2.0, DVec3::NEG_Y)];
+    let toward = unchanged(&Renderer::new(&scene).expect("complete").threads(1), "toward");
+    assert_eq!(toward.rays.rays[1] + count(&toward, "shadows"), toward.rays.hits[0]);
+    let (dark, cast) = (count(&toward, "shadows"), toward.rays.rays[1]);
+    // Some 2 x 12^2 pi samples, of which those that see the lamp lie above 60 degrees of latitude.
+    assert!(count(&toward, "lights") == 0 && dark > 1000 && cast > 50, "{dark} {cast}");
+}
+
+/// The picture of a texture is not decoded unless a primitive shows it: its head alone must be sound.
+#[test]
+fn pictures_that_nothing_shows_are_not_decoded() {
+    let room = tempfile::tempdir().expect("a directory");
+    let uv = std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/textures/uv.png")).expect("a picture");
+    std::fs::write(room.path().join("cut.png"), &uv[..uv.len() / 2]).expect("written");
+    let scene = |color: &str| {
+        let text = format!(
+            "[textures.cut]\ntype = \"image\"\nfile = \"cut.png\"\n[materials.m]\ntype = \"diffuse\"\nalbedo = {color}\n\
+             [[shapes]]\ntype = \"sphere\"\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"m\"\n"
+        );
+        Scene::from_toml(&text, room.path())
+    };
+    let unused = scene("[1, 1, 1]").expect("nothing shows it");
+    let TextureKind::Image(image) = &unused.textures[0].kind else { panic!("a picture") };
+    assert_eq!((image.width, image.height, image.texels.len()), (128, 128, 0));
+    let used = scene("{ texture = \"cut\" }").expect_err("half a picture").to_string();
+    assert!(used.contains("<text>:3:8") && used.contains("cut.png must be a sound PNG"), "{used}");
 }

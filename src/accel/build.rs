@@ -41,10 +41,15 @@ impl Boundable for Item {
 impl Tree {
     /// All that takes part in a plan.
     pub fn planned(plan: &Plan) -> Self {
-        match plan.skips.leaves_out(Skip::Tree) {
+        let mut tree = match plan.skips.leaves_out(Skip::Tree) {
             true => Tree::straight(plan.parts(), &plan.visible),
             false => Tree::new(plan.parts(), &plan.visible),
+        };
+        if !plan.skips.allows(Skip::Kinds) {
+            let absent = tree.stores.pad().into_iter();
+            tree.loose.extend(absent.map(|kind| Leaf { kind, block: 0, count: 1 }));
         }
+        tree
     }
 
     /// Takes the parts; `visible` tells by material which sides are seen.

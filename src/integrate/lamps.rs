@@ -120,7 +120,7 @@ impl Direct<'_> {
         // What scattered rays may meet as well is weighed.
         let weighed = self.is_path() && shadows && wave.depth < self.settings.max_depth;
         let skip = self.plan.skips.allows(Skip::Shadows);
-        let mut lit = [0; PACKETS];
+        let (mut lit, mut cast) = ([0; PACKETS], [0; PACKETS]);
         let mut radiance = [Vec3x8::ZERO; PACKETS];
         sink.shadows.renew(None);
         sink.shadows.packets.fill(RayPacket::dead());
@@ -132,10 +132,14 @@ impl Direct<'_> {
             let share = wave.weighted(p, share);
             let facing = if skip { facing & Mask8::gt(share.sum(), Float8::ZERO) } else { facing };
             (radiance[p], lit[p]) = (share, facing.bits() & shaded.hit);
-            sink.shadows.packets[p] = shaded.rays_to(&drawn, Mask8::from_bits(lit[p]));
+            if shadows {
+                // All but those in the light itself, where there is no way to go.
+                cast[p] = if skip { lit[p] } else { Mask8::le(drawn.wi.x, drawn.wi.x).bits() & shaded.hit };
+                sink.left_out[Skip::Shadows] += u64::from((shaded.hit & !cast[p]).count_ones());
+                sink.shadows.packets[p] = shaded.rays_to(&drawn, Mask8::from_bits(cast[p]));
+            }
         }
         if shadows {
-            let cast = lit;
             self.settle(index, wave, hits.1, (&cast, &mut lit), sink);
         } else if R::ON {
             for (p, lit) in lit.into_iter().enumerate() {

@@ -76,6 +76,7 @@ impl<'s> Plan<'s> {
             true => reach::unshadowed(scene, &needs.lights, origin, &mut skips),
             false => vec![None; scene.lights.len()],
         };
+        decide_kinds(scene, &mut skips);
         let count = scene.primitive_count();
         let why = || format!("a straight loop over {count} primitives is faster");
         skips.decide(Skip::Tree, 0, (1..=FEW).contains(&count).then(why));
@@ -146,5 +147,31 @@ impl<'s> Plan<'s> {
     pub fn is_same_on_both_sides(&self, material: u32) -> bool {
         let [back, front] = self.sides[material as usize];
         back == front
+    }
+}
+
+/// Leaves out the kernels of what a scene does not hold.
+fn decide_kinds(scene: &Scene, skips: &mut Skips) {
+    let mut absent = Kind::ALL.to_vec();
+    let mut mark = |shape: &Shape| absent.retain(|kind| !may_be_of(shape, *kind));
+    scene.objects.iter().for_each(|object| mark(&object.shape));
+    // All rows of a cloud are of one kind.
+    scene.clouds.iter().filter(|cloud| !cloud.is_empty()).for_each(|cloud| mark(&cloud.primitive(0).shape));
+    let names: Vec<&str> = absent.iter().map(|kind| kind.name()).collect();
+    let why = || format!("the scene holds no {}", names.join(", no "));
+    skips.decide(Skip::Kinds, names.len() as u64, (!names.is_empty()).then(why));
+}
+
+/// Whether some part of a shape may be of a kind.
+fn may_be_of(shape: &Shape, kind: Kind) -> bool {
+    match (shape, kind) {
+        (Shape::Sphere(_), Kind::Sphere) | (Shape::Plane(_), Kind::Plane) | (Shape::Disk(_), Kind::Disk) => true,
+        (Shape::Polygon(_), Kind::Triangle | Kind::Quad | Kind::Octagon) => true,
+        (Shape::Box(cuboid), Kind::Box) => cuboid.rotation.is_none(),
+        (Shape::Box(cuboid), Kind::TurnedBox) => cuboid.rotation.is_some(),
+        (Shape::Cylinder(_), Kind::Cylinder) | (Shape::Cone(_), Kind::Cone) => true,
+        (Shape::Cylinder(cylinder), Kind::Disk) => cylinder.caps,
+        (Shape::Cone(cone), Kind::Disk) => cone.caps,
+        _ => false,
     }
 }

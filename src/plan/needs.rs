@@ -2,7 +2,7 @@
 
 use super::reach;
 use super::skips::{Skip, Skips};
-use crate::scene::{CloudMaterial, Model, Object, Paint, Scene, Shape, Source};
+use crate::scene::{Model, Object, Scene, Shape, Source};
 
 /// Features of a scene, as far as something shows them.
 #[derive(Debug)]
@@ -24,21 +24,15 @@ pub struct Needs {
 impl Needs {
     /// Looks through a scene.
     pub fn of(scene: &Scene) -> Self {
-        let used = used_materials(scene);
+        let used = scene.used_materials();
         let models = || used.iter().map(|index| &scene.materials[*index].model);
-        let mut textures = vec![false; scene.textures.len()];
-        for model in models() {
-            if let Paint::Texture(index) = model.paint() {
-                textures[index] = true;
-            }
-        }
         let lit = models().any(Model::is_lit);
         Needs {
             colored: scene.clouds.iter().any(|cloud| cloud.colors.is_some()),
             smooth: scene.objects.iter().any(has_normals),
             scatters: models().any(Model::scatters),
             shines: models().any(|model| matches!(model, Model::Phong { ks, .. } if *ks > 0.0)),
-            textures,
+            textures: scene.used_textures(),
             lights: scene.lights.iter().map(|light| lit && reaches(&light.source, scene)).collect(),
         }
     }
@@ -48,7 +42,7 @@ impl Needs {
         let dark = self.lights.iter().filter(|needed| !**needed).count();
         let why = match scene.lights.iter().any(|light| reaches(&light.source, scene)) {
             true if !self.lights.contains(&true) => "nothing in the scene takes light directly",
-            _ => "they have no power, or their cones meet nothing",
+            _ => "they have no power, or nothing lies where they shine",
         };
         skips.decide(Skip::Lights, dark as u64, (dark > 0).then(|| why.to_owned()));
         let why = "lights behind a surface or out of range give nothing, in shadow or not";
@@ -60,7 +54,7 @@ impl Needs {
 
     fn decide_shading(&self, skips: &mut Skips) {
         let unused = self.textures.iter().filter(|used| !**used).count();
-        let why = "no primitive shows them";
+        let why = "no primitive shows them, so that only their sizes were read";
         skips.decide(Skip::Textures, unused as u64, (unused > 0).then(|| why.to_owned()));
         let attributes = [
             (self.textures.contains(&true), "texture coordinates"),
@@ -77,21 +71,6 @@ impl Needs {
 
 fn reaches(source: &Source, scene: &Scene) -> bool {
     !source.is_dark() && reach::meets_anything(source, scene)
-}
-
-/// Materials that some primitive shows, their backs among them.
-fn used_materials(scene: &Scene) -> Vec<usize> {
-    let mut used = vec![false; scene.materials.len()];
-    scene.objects.iter().for_each(|object| used[object.material] = true);
-    for cloud in &scene.clouds {
-        match &cloud.material {
-            CloudMaterial::One(material) => used[*material] = true,
-            CloudMaterial::Each(materials) => materials.iter().for_each(|material| used[*material as usize] = true),
-        }
-    }
-    let backs: Vec<usize> = (0..used.len()).filter(|i| used[*i]).filter_map(|i| scene.materials[i].back).collect();
-    backs.into_iter().for_each(|back| used[back] = true);
-    (0..used.len()).filter(|i| used[*i]).collect()
 }
 
 fn has_normals(object: &Object) -> bool {

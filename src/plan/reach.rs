@@ -4,7 +4,7 @@
 use glam::DVec3;
 
 use super::skips::{Skip, Skips};
-use crate::scene::{Backdrop, Camera, Integrator, Lens, Light, Scene, Shape, Source};
+use crate::scene::{Backdrop, Camera, Emitter, Integrator, Lens, Light, Scene, Shape, Source};
 
 /// Most primitives of which every pair is looked at.
 const MOST_PAIRS: usize = 256;
@@ -137,17 +137,31 @@ pub fn unshadowed(scene: &Scene, needed: &[bool], origin: DVec3, skips: &mut Ski
     unshadowed
 }
 
-/// Whether a spot's cone meets anything.
+/// Whether anything lies where a light shines: in a spot's cone, before something flat.
 pub fn meets_anything(source: &Source, scene: &Scene) -> bool {
-    let Source::Spot { position, direction, cone, .. } = *source else { return true };
-    let axis = direction.normalize();
-    let may_meet = |ball: Ball| {
-        let way = ball.center - position;
-        let distance = way.length();
-        let half = (ball.radius / distance).min(1.0).asin();
-        ball.radius >= distance || axis.angle_between(way) <= cone.to_radians() + half + 1e-3
+    let is_met = |may_meet: &dyn Fn(Ball) -> bool| {
+        scene.primitives().any(|primitive| Ball::around(&primitive.shape).is_none_or(may_meet))
     };
-    scene.primitives().any(|primitive| Ball::around(&primitive.shape).is_none_or(may_meet))
+    match source {
+        Source::Point { .. } | Source::Directional { .. } => true,
+        Source::Spot { position, direction, cone, .. } => {
+            let axis = direction.normalize();
+            is_met(&|ball| {
+                let way = ball.center - position;
+                let distance = way.length();
+                let half = (ball.radius / distance).min(1.0).asin();
+                ball.radius >= distance || axis.angle_between(way) <= cone.to_radians() + half + 1e-3
+            })
+        }
+        Source::Area { emitter, .. } => {
+            let (point, normal) = match emitter {
+                Emitter::Sphere { .. } => return true,
+                Emitter::Disk { center, normal, .. } => (*center, normal.normalize()),
+                Emitter::Polygon(polygon) => (polygon.corners[0], polygon.normal()),
+            };
+            is_met(&|ball| normal.dot(ball.center - point) > -(1.001 * ball.radius + ball.slack(point)))
+        }
+    }
 }
 
 /// A camera and the pixels that are asked of it.

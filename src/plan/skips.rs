@@ -10,6 +10,8 @@ use serde::Serialize;
 /// A kind of work that may be left out. With or without, a picture is the same to the bit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Skip {
+    /// Kernels of kinds of primitives that are absent.
+    Kinds,
     /// The tree, where there is little to be met.
     Tree,
     /// Camera rays that can only see the background.
@@ -33,7 +35,8 @@ pub enum Skip {
 }
 
 /// Each kind with its name, and the word for what is counted of it; none where nothing is.
-const ROWS: [(Skip, &str, Option<&str>); 10] = [
+const ROWS: [(Skip, &str, Option<&str>); 11] = [
+    (Skip::Kinds, "kinds", Some("kernels")),
     (Skip::Tree, "tree", None),
     (Skip::Background, "background", Some("camera rays")),
     (Skip::Objects, "objects", Some("primitives")),

@@ -20,15 +20,19 @@ pub fn validate(scene: &Scene) -> Result<(), InvalidScene> {
         let exists = !matches!(paint.paint(), Paint::Texture(index) if !texture(index));
         require(exists, || format!("the texture of material {index} does not exist"))
     })?;
+    scene.clouds.iter().enumerate().try_for_each(|(index, cloud)| columns(index, cloud))?;
+    scene.primitives().enumerate().try_for_each(|(index, primitive)| shape(scene, index, &primitive))?;
+    let used = scene.used_textures();
     scene.textures.iter().enumerate().try_for_each(|(index, texture)| match &texture.kind {
         TextureKind::Checker(_) => Ok(()),
         TextureKind::Image(image) => {
             let whole = image.width > 0 && image.width.checked_mul(image.height) == Some(image.texels.len());
-            require(whole && image.height > 0, || format!("texture {index} has not as many texels as its size says"))
+            let is_open = image.texels.is_empty() && !used[index];
+            require(is_open || whole && image.height > 0, || {
+                format!("texture {index} has not as many texels as its size says")
+            })
         }
-    })?;
-    scene.clouds.iter().enumerate().try_for_each(|(index, cloud)| columns(index, cloud))?;
-    scene.primitives().enumerate().try_for_each(|(index, primitive)| shape(scene, index, &primitive))
+    })
 }
 
 fn columns(index: usize, cloud: &Cloud) -> Result<(), InvalidScene> {

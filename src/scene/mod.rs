@@ -203,6 +203,32 @@ impl Scene {
         }
     }
 
+    /// Materials that some primitive shows, their backs among them, in order.
+    pub fn used_materials(&self) -> Vec<usize> {
+        let mut used = vec![false; self.materials.len()];
+        self.objects.iter().for_each(|object| used[object.material] = true);
+        for cloud in &self.clouds {
+            match &cloud.material {
+                CloudMaterial::One(material) => used[*material] = true,
+                CloudMaterial::Each(materials) => materials.iter().for_each(|material| used[*material as usize] = true),
+            }
+        }
+        let backs: Vec<usize> = (0..used.len()).filter(|i| used[*i]).filter_map(|i| self.materials[i].back).collect();
+        backs.into_iter().for_each(|back| used[back] = true);
+        (0..used.len()).filter(|i| used[*i]).collect()
+    }
+
+    /// By texture: whether some primitive shows it.
+    pub fn used_textures(&self) -> Vec<bool> {
+        let mut used = vec![false; self.textures.len()];
+        for material in self.used_materials() {
+            if let Paint::Texture(index) = self.materials[material].model.paint() {
+                used[index] = true;
+            }
+        }
+        used
+    }
+
     fn cloud_of(&self, index: usize) -> Option<&Cloud> {
         let mut row = index.checked_sub(self.objects.len())?;
         self.clouds.iter().find(|cloud| {

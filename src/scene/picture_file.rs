@@ -36,11 +36,9 @@ pub struct Picture {
 /// # Errors
 /// What is wrong with the file; the rule goes on from the file's name.
 pub fn read(path: &Path, color_space: Option<ColorSpace>) -> Result<Picture, Broken> {
-    let image = decode(path)?;
+    let image = DynamicImage::from_decoder(open(path)?).map_err(unsound)?;
     let (width, height) = (image.width() as usize, image.height() as usize);
-    let float = matches!(image.color(), ColorType::Rgb32F | ColorType::Rgba32F);
-    let usual = if float { ColorSpace::Linear } else { ColorSpace::Srgb };
-    let color_space = color_space.unwrap_or(usual);
+    let color_space = color_space.unwrap_or(usual(image.color()));
     let mut texels = linear(image, color_space);
     if let Some(bad) = texels.iter().position(|texel| texel.iter().any(|value| !value.is_finite())) {
         let found = format!("{:?} in column {}, row {}", texels[bad], bad % width, bad / width);
@@ -53,15 +51,35 @@ pub fn read(path: &Path, color_space: Option<ColorSpace>) -> Result<Picture, Bro
     Ok(Picture { width, height, color_space, texels: texels.into(), negative })
 }
 
+/// The size of a picture and how its values would be read; no texels.
+///
+/// # Errors
+/// As [`read`], as far as the head of the file shows it.
+pub fn look(path: &Path, color_space: Option<ColorSpace>) -> Result<Picture, Broken> {
+    let decoder = open(path)?;
+    let (width, height) = decoder.dimensions();
+    let color_space = color_space.unwrap_or(usual(decoder.color_type()));
+    let (width, height) = (width as usize, height as usize);
+    Ok(Picture { width, height, color_space, texels: Arc::new([]), negative: 0 })
+}
+
+fn usual(color: ColorType) -> ColorSpace {
+    match color {
+        ColorType::Rgb32F | ColorType::Rgba32F => ColorSpace::Linear,
+        _ => ColorSpace::Srgb,
+    }
+}
+
 fn broken(rule: &str, found: String) -> Broken {
     Broken { key: "", rule: rule.to_owned().into(), found }
 }
 
-fn decode(path: &Path) -> Result<DynamicImage, Broken> {
+fn unsound(error: image::ImageError) -> Broken {
+    broken(&format!("must be a sound PNG, JPEG, HDR or EXR picture: {error}"), String::new())
+}
+
+fn open(path: &Path) -> Result<impl ImageDecoder + use<>, Broken> {
     let cannot = |error: std::io::Error| broken(&format!("cannot be read: {error}"), String::new());
-    let unsound = |error: image::ImageError| {
-        broken(&format!("must be a sound PNG, JPEG, HDR or EXR picture: {error}"), String::new())
-    };
     if !fs::metadata(path).map_err(cannot)?.is_file() {
         return Err(broken("must be a file, not a directory or device", String::new()));
     }
@@ -76,7 +94,7 @@ fn decode(path: &Path) -> Result<DynamicImage, Broken> {
     if texels == 0 || texels > MOST_TEXELS {
         return Err(broken("must have 1 to 2^27 pixels", format!("{width} x {height}")));
     }
-    DynamicImage::from_decoder(decoder).map_err(unsound)
+    Ok(decoder)
 }
 
 fn linear(image: DynamicImage, color_space: ColorSpace) -> Vec<Texel> {

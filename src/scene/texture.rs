@@ -47,7 +47,7 @@ pub struct ImageTexture {
     pub width: usize,
     /// Texels, >= 1.
     pub height: usize,
-    /// Linear Rec. 709, row by row from the top, `width x height` texels.
+    /// Linear Rec. 709, row by row from the top, `width x height` texels; none where no primitive shows the picture.
     pub texels: Arc<[Texel]>,
 }
 

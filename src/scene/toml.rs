@@ -24,6 +24,7 @@ use self::files::Texts;
 use self::groups::Transform;
 use self::names::Names;
 use self::table::{Context, Item, Table};
+use self::values::NamedFile;
 use crate::scene::frames::{Draft, OpenCamera, Store};
 use crate::scene::{Object, Part, Scene, SceneErrors, Shape, Track};
 
@@ -68,6 +69,8 @@ struct Reader<'a, 's> {
     transforms: Vec<Transform>,
     store: &'s mut Store,
     scene: Scene,
+    /// Pictures of textures that are decoded when it is known which of them are shown.
+    pictures: Vec<(usize, Item<'a>, NamedFile)>,
     /// Cameras that are placed when all of the scene is known.
     cameras: Vec<OpenCamera>,
 }
@@ -82,6 +85,7 @@ impl<'a, 's> Reader<'a, 's> {
             transforms: Vec::new(),
             store,
             scene: Scene::default(),
+            pictures: Vec::new(),
             cameras: Vec::new(),
         }
     }
@@ -98,6 +102,7 @@ impl<'a, 's> Reader<'a, 's> {
         self.read_lights();
         self.read_shapes();
         self.read_clouds();
+        self.read_pictures();
         for root in std::mem::take(&mut self.roots) {
             root.finish();
         }

@@ -50,6 +50,12 @@ impl<P: Part> Store<P> {
         Store { blocks, groups, sides, parts }
     }
 
+    /// A block that no ray can hit, in a store that has none.
+    pub fn pad(&mut self) {
+        self.blocks.push(Block(P::Rows::pack([const { None }; LANES])));
+        self.groups.push(Group { first: 0, count: 0 });
+    }
+
     /// The parts, group by group.
     pub fn parts(&self) -> &[P] {
         &self.parts

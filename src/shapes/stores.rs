@@ -93,6 +93,27 @@ impl Stores {
         }
     }
 
+    /// Gives kinds that are absent a block that no ray can hit; which they are.
+    pub fn pad(&mut self) -> Vec<Kind> {
+        fn pad<P: Part>(store: &mut Store<P>) {
+            if store.blocks() == 0 {
+                store.pad();
+            }
+        }
+        let absent = Kind::ALL.into_iter().filter(|kind| self.blocks(*kind) == 0).collect();
+        pad(&mut self.spheres);
+        pad(&mut self.planes);
+        pad(&mut self.disks);
+        pad(&mut self.triangles);
+        pad(&mut self.quads);
+        pad(&mut self.octagons);
+        pad(&mut self.boxes);
+        pad(&mut self.turned_boxes);
+        pad(&mut self.cylinders);
+        pad(&mut self.cones);
+        absent
+    }
+
     /// How many blocks of a kind there are.
     pub fn blocks(&self, kind: Kind) -> usize {
         self.visit(kind, Blocks)

@@ -9,7 +9,7 @@ use super::keyed::is_keyed;
 use super::table::{Item, Named, Table};
 use super::values::{NamedFile, choice, color, file, list, number, pair};
 use crate::scene::picture_file::{self, Picture};
-use crate::scene::rules::Rule;
+use crate::scene::rules::{Broken, Rule};
 use crate::scene::{
     Checker, ColorSpace, ImageTexture, Material, Model, Paint, Part, Texture, TextureFilter, TextureKind, Visible, Wrap,
 };
@@ -80,7 +80,8 @@ impl<'a> Reader<'a, '_> {
                 let color_space = table.maybe("color_space", choice(COLOR_SPACES));
                 (|| {
                     let (named, item) = named?;
-                    let picture = self.picture(&item, &named, color_space?)?;
+                    let picture = item.fine(&named, picture_file::look(&named.path, color_space?))?;
+                    self.pictures.push((self.scene.textures.len(), item, named.clone()));
                     Some(TextureKind::Image(ImageTexture {
                         file: named.path,
                         wrap: wrap?,
@@ -97,16 +98,26 @@ impl<'a> Reader<'a, '_> {
         kind
     }
 
+    /// Decodes the pictures that some primitive shows; all of them where something is wrong anyway.
+    pub fn read_pictures(&mut self) {
+        let is_sound = self.roots.first().is_none_or(|root| root.context.log.count() == 0);
+        let used = if is_sound { self.scene.used_textures() } else { vec![true; self.scene.textures.len()] };
+        for (index, item, named) in std::mem::take(&mut self.pictures) {
+            let Some(TextureKind::Image(image)) = self.scene.textures.get(index).map(|texture| &texture.kind) else {
+                continue;
+            };
+            let space = Some(image.color_space);
+            let picture = if used[index] { self.picture(&item, &named, space) } else { None };
+            if let (Some(picture), TextureKind::Image(image)) = (picture, &mut self.scene.textures[index].kind) {
+                image.texels = picture.texels;
+            }
+        }
+    }
+
     /// The picture of a file, read once: textures of the same file share their texels.
     pub fn picture(&mut self, item: &Item<'a>, named: &NamedFile, space: Option<ColorSpace>) -> Option<Picture> {
         let read = || -> Result<_, Infallible> {
-            let picture = match picture_file::read(&named.path, space) {
-                Ok(picture) => Some(picture),
-                Err(broken) => {
-                    item.context.fail(&item.span, format!("{} {}", named.shown, broken.rule), broken.found);
-                    None
-                }
-            };
+            let picture = item.fine(named, picture_file::read(&named.path, space));
             if let Some(negative) = picture.as_ref().map(|picture| picture.negative).filter(|negative| *negative > 0) {
                 item.context.warn(&item.span, format!("{} has {negative} negative values, taken for 0", named.shown));
             }
@@ -162,6 +173,17 @@ impl<'a> Reader<'a, '_> {
         let texture = table.need("texture", |item| self.textures.find(item));
         table.finish();
         texture.map(Paint::Texture)
+    }
+}
+
+impl Item<'_> {
+    /// A picture of a file that it names, if nothing is wrong with that.
+    fn fine(&self, named: &NamedFile, picture: Result<Picture, Broken>) -> Option<Picture> {
+        picture
+            .map_err(|broken| {
+                self.context.fail(&self.span, format!("{} {}", named.shown, broken.rule), broken.found);
+            })
+            .ok()
     }
 }
 

@@ -154,6 +154,7 @@ pub fn rotation(item: &Item<'_>) -> Option<Option<DQuat>> {
 }
 
 /// A file that is named: its path as written, and where it is.
+#[derive(Clone)]
 pub struct NamedFile {
     pub shown: String,
     pub path: PathBuf,
