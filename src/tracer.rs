@@ -1,5 +1,7 @@
 //! A scene ready to be asked what a ray meets.
 
+use std::borrow::Cow;
+
 use glam::DVec3;
 
 use crate::accel::{Counts, PACKETS, Tile, Tree, Walk};
@@ -7,7 +9,7 @@ use crate::lanes::{Float8, LANES, Ray, RayPacket, UNIT_ROUNDOFF, Vec3x8};
 use crate::plan::{InvalidScene, Plan, validate};
 use crate::scene::Scene;
 use crate::shade::attributes;
-use crate::shapes::{Ray64, RowRef};
+use crate::shapes::{Ray64, RowRef, Surface64};
 
 /// The columns and the tree of one scene.
 ///
@@ -52,6 +54,11 @@ pub struct Hit {
 }
 
 impl Hit {
+    /// With its place in other units.
+    fn in_units(self, unit: f32) -> Self {
+        Hit { t: self.t * unit, ..self }
+    }
+
     /// The ray that leaves the surface in a direction, without meeting it again where it was.
     ///
     /// Source: after Pharr, Jakob and Humphreys, Physically Based Rendering, 4th edition, 2023, section
@@ -111,9 +118,10 @@ impl<'s> Tracer<'s> {
 
     /// What one ray meets first.
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        let (ray, unit) = &tamed(ray);
         let (t, row) = self.tree.closest(ray, &mut Walk::default());
         let found = self.found(&RayPacket::splat(ray), Float8::splat(t), Float8::splat(row.to_lane()));
-        self.eight_hits(&RayPacket::splat(ray), &found)[0]
+        self.eight_hits(&RayPacket::splat(ray), &found)[0].map(|hit| hit.in_units(*unit))
     }
 
     /// What each ray meets first: the same bits as one by one, faster.
@@ -185,12 +193,12 @@ impl<'s> Tracer<'s> {
 
     /// Whether one ray meets anything.
     pub fn is_occluded(&self, ray: &Ray) -> bool {
-        self.tree.occluded(ray, &mut Walk::default())
+        self.tree.occluded(&tamed(ray).0, &mut Walk::default())
     }
 
     #[inline(always)]
     fn found(&self, rays: &RayPacket, t: Float8, rows: Float8) -> Found8 {
-        let (surface, owners) = self.tree.stores().surface::<true>(rows, rays, t);
+        let (surface, owners) = self.tree.stores().surface::<true>(rows, rays, t, None);
         Found8 { t, rows, normal: surface.normal, primitives: owners.map(|owner| owner.primitive) }
     }
 
@@ -199,44 +207,28 @@ impl<'s> Tracer<'s> {
         let mut tile = Tile::empty();
         batch.unpack(i, std::slice::from_mut(&mut tile));
         let packets = tile.packets.iter().zip(&found.packets);
-        packets.flat_map(|(rays, found)| self.eight_hits(rays, found)).collect()
+        let hits = packets.flat_map(|(rays, found)| self.eight_hits(rays, found));
+        match batch.units.get(i) {
+            None => hits.collect(),
+            Some(units) => hits.zip(units).map(|(hit, unit)| hit.map(|hit| hit.in_units(*unit))).collect(),
+        }
     }
 
-    /// The place of a hit again, in f64: what is left is its rounding.
-    fn place(&self, row: RowRef, ray: &Ray64, t: f32) -> f32 {
-        let again = || self.tree.stores().refine(row, ray, f64::from(t)).map(|surface| surface.t);
-        self.tree.stores().decide(row, ray).or_else(again).map_or(t, |t| t as f32)
-    }
-
-    /// Point and normal again in f64, where a scene is so small or so large that f32 holds no squares of it.
-    #[cold]
-    fn again(&self, row: RowRef, ray: &Ray64, t: f32) -> ([f32; 3], [f32; 3]) {
-        let surface = self.tree.stores().refine(row, ray, f64::from(t));
-        let narrow = |v: DVec3| v.as_vec3().to_array();
-        surface.map_or(([0.0; 3], [0.0; 3]), |surface| (narrow(surface.point), narrow(surface.normal)))
-    }
-
+    /// Place, point and normal again in f64, from which what is told of a hit is rounded.
     fn eight_hits(&self, rays: &RayPacket, found: &Found8) -> [Option<Hit>; LANES] {
-        let Found8 { t, rows, normal, primitives } = *found;
         let stores = self.tree.stores();
-        let (surface, owners) = stores.surface::<false>(rows, rays, t);
-        let (points, normals) = (surface.point.to_arrays(), normal.to_arrays());
-        let (dirs, errors, t) = (rays.dir.to_arrays(), surface.error.to_array(), t.to_array());
         std::array::from_fn(|i| {
-            let row = RowRef::from_lane(rows.as_array()[i]);
-            row.kind()?;
-            let (owner, mut point, mut normal) = (owners[i], points[i], normals[i]);
+            let (row, t) = (RowRef::from_lane(found.rows.as_array()[i]), f64::from(found.t.as_array()[i]));
             let ray = Ray64::exact(&rays.lane(i));
-            let t = self.place(row, &ray, t[i]);
-            if !normal.iter().chain(&point).all(|x| x.is_finite()) {
-                (point, normal) = self.again(row, &ray, t);
-            }
-            let front = normal[0] * dirs[i][0] + normal[1] * dirs[i][1] + normal[2] * dirs[i][2] < 0.0;
+            let place = stores.decide(row, &ray).unwrap_or(t);
+            let Surface64 { point, normal, t } = stores.refine(row, &ray, place)?;
+            let owner = stores.owner(row.kind()?, row.row());
+            let front = normal.dot(ray.dir) < 0.0;
             let material = self.plan.side_material(owner.material, front);
-            let uv = attributes::uv(&self.plan, stores, row, owner, DVec3::from_array(point.map(f64::from)));
-            let error = errors[i] + 2.0 * UNIT_ROUNDOFF * point.iter().map(|x| x.abs()).sum::<f32>();
-            let uv = uv.as_vec2().to_array();
-            Some(Hit { t, primitive: primitives[i], material, normal, uv, front, point, error })
+            let uv = attributes::uv(&self.plan, stores, row, owner, point).as_vec2().to_array();
+            let (point, normal) = (point.as_vec3().to_array(), normal.as_vec3().to_array());
+            let error = 2.0 * UNIT_ROUNDOFF * point.iter().map(|x| x.abs()).sum::<f32>();
+            Some(Hit { t: t as f32, primitive: found.primitives[i], material, normal, uv, front, point, error })
         })
     }
 }
@@ -265,6 +257,11 @@ impl Found {
         };
         self.packets.iter().map(met).sum()
     }
+
+    /// The unit normal, outward, where ray `i` of the tile met something, as f32 alone has it.
+    pub fn normal(&self, i: usize) -> [f32; 3] {
+        self.packets[i / LANES].normal.lane(i % LANES)
+    }
 }
 
 /// What eight rays met: place, row, unit normal (outward) and whose it is.
@@ -289,6 +286,8 @@ pub struct RayBatch {
     tiles: Vec<Columns64>,
     /// By tile; none where the rays of each tile share their origin.
     origins: Vec<[Vec3x8; PACKETS]>,
+    /// By tile and ray what places are to be multiplied with; none where that is 1 everywhere.
+    units: Vec<[f32; TILE]>,
 }
 
 /// The rays of a tile but for their origins.
@@ -304,6 +303,7 @@ impl RayBatch {
     /// Turns rays into columns; those that cannot hit anything are dead.
     pub fn new(rays: &[Ray]) -> Self {
         let (mut tiles, mut origins) = (Vec::new(), Vec::new());
+        let (rays, units) = all_tamed(rays);
         for Tile { packets, common, .. } in rays.chunks(TILE).map(tile) {
             let (dirs, t_min) = (packets.map(|rays| rays.dir), packets.map(|rays| rays.t_min));
             tiles.push(Columns64 { dirs, t_min, t_max: packets.map(|rays| rays.t_max), common });
@@ -312,7 +312,7 @@ impl RayBatch {
         if tiles.iter().all(|tile| tile.common.is_some()) {
             origins = Vec::new();
         }
-        RayBatch { tiles, origins }
+        RayBatch { tiles, origins, units }
     }
 
     /// Tiles of 64 rays, the last of them perhaps of fewer.
@@ -334,6 +334,32 @@ impl RayBatch {
             }
         }
     }
+}
+
+/// Lengths of directions, by their largest coordinate, with which kernels are at ease.
+const AT_EASE: std::ops::RangeInclusive<f32> = 1e-6..=1e6;
+
+/// The same ray with a direction that is not extreme, and what places on it are to be multiplied with: a power of two, so
+/// nothing is rounded by that.
+fn tamed(ray: &Ray) -> (Ray, f32) {
+    let largest = ray.dir.iter().fold(0.0f32, |most, d| most.max(d.abs()));
+    if AT_EASE.contains(&largest) || !ray.is_valid() {
+        return (*ray, 1.0);
+    }
+    let exponent = (f64::from(largest).log2().floor() as i32).clamp(-126, 126);
+    let (unit, inverse) = (2f32.powi(-exponent), 2f32.powi(exponent));
+    let tamed = Ray { dir: ray.dir.map(|d| d * unit), t_min: ray.t_min * inverse, t_max: ray.t_max * inverse, ..*ray };
+    (tamed, unit)
+}
+
+/// All of them, and where any is another than it was their units, 64 a tile.
+fn all_tamed(rays: &[Ray]) -> (Cow<'_, [Ray]>, Vec<[f32; TILE]>) {
+    if rays.iter().all(|ray| tamed(ray).1 == 1.0) {
+        return (Cow::Borrowed(rays), Vec::new());
+    }
+    let (tamed, units): (Vec<Ray>, Vec<f32>) = rays.iter().map(tamed).unzip();
+    let tile = |units: &[f32]| std::array::from_fn(|i| units.get(i).copied().unwrap_or(1.0));
+    (Cow::Owned(tamed), units.chunks(TILE).map(tile).collect())
 }
 
 /// Up to 64 rays as a tile.

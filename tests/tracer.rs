@@ -5,7 +5,7 @@ mod common;
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
 
-use common::{Dice, MAKERS, is_closed, is_flat, polygon, ray, scene_of, turn};
+use common::{Dice, MAKERS, cuboid, is_closed, is_flat, polygon, ray, scene_of, sphere, turn};
 use glam::DVec3;
 use octray::reference::{self, Reference};
 use octray::scene::Shape;
@@ -197,4 +197,61 @@ fn no_ray_leaks_through_a_seam() {
         }
     }
     assert!(aimed > 100_000, "{aimed}");
+}
+
+/// Boxes thinner than f32 rounds, and spheres smaller than that: the near side is met, and told as the front.
+#[test]
+fn bodies_smaller_than_a_rounding_show_the_side_that_was_met() {
+    let mut dice = Dice(7);
+    let mut met = 0;
+    for size in [1e-6, 1e-9, 1e-12] {
+        for _ in 0..300 {
+            let center = dice.in_cube(3.0);
+            let mut half = DVec3::ONE;
+            half[dice.index(3)] = size;
+            let body = if dice.index(2) == 0 { cuboid(center - half, center + half) } else { sphere(center, size) };
+            let scene = scene_of([body]);
+            let tracer = Tracer::new(&scene).expect("valid");
+            let origin = (center + 4.0 * dice.direction()).as_vec3().as_dvec3();
+            let ray = ray(origin, center + dice.in_cube(0.4 * size) - origin);
+            let (Some(hit), want) = (tracer.closest_hit(&ray), Reference::new(&scene).closest(&common::exact(&ray)))
+            else {
+                continue;
+            };
+            let want = want.expect("the reference meets it too");
+            let normal = DVec3::from_array(hit.normal.map(f64::from));
+            assert!(hit.front && want.front, "{size} {ray:?} {hit:?}");
+            assert!((normal - want.normal).length() < 1e-5, "{size} {ray:?} {hit:?} {want:?}");
+            met += 1;
+        }
+    }
+    assert!(met > 300, "{met}");
+}
+
+/// The length of a direction is nothing but the unit of `t`.
+#[test]
+fn directions_may_be_of_any_length() {
+    let mut dice = Dice(8);
+    let mut met = 0;
+    for (_, maker) in MAKERS {
+        let scene = scene_of([maker(DVec3::ZERO, 1.0, turn(&mut dice))]);
+        let tracer = Tracer::new(&scene).expect("valid");
+        let mut aim = || {
+            let origin = 4.0 * dice.direction();
+            ray(origin, dice.in_cube(0.8) - origin)
+        };
+        let rays: Vec<Ray> = (0..64).map(|_| aim()).collect();
+        for power in [-110, -70, -30, 25, 70, 110] {
+            let factor = 2f32.powi(power);
+            let scaled: Vec<Ray> = rays.iter().map(|ray| Ray { dir: ray.dir.map(|d| d * factor), ..*ray }).collect();
+            let dark = tracer.occluded(&scaled);
+            for (i, (a, b)) in tracer.closest_hits(&rays).iter().zip(tracer.closest_hits(&scaled)).enumerate() {
+                assert_eq!(b, tracer.closest_hit(&scaled[i]));
+                assert_eq!(b.is_some(), dark[i]);
+                assert_eq!(b.map(|hit| Hit { t: hit.t * factor, ..hit }), *a, "{power} {:?}", rays[i]);
+                met += usize::from(a.is_some());
+            }
+        }
+    }
+    assert!(met > 500, "{met}");
 }

@@ -1,6 +1,6 @@
 //! Bounds of the rays of a tile, packet by packet.
 
-use super::node::{Beam, LEAST_DIRECTION, OUTWARD, near_planes};
+use super::node::{Beam, OUTWARD, least_direction, near_planes};
 use super::tile::{PACKETS, Tile};
 use crate::lanes::{Columns, Float8, Mask8, RayPacket, UNIT_ROUNDOFF, Vec3x8, float8, greatest, least};
 
@@ -107,11 +107,12 @@ impl Bundle {
             start: float8(self.start),
         };
         let live = Mask8::from_bits(live);
+        let [x, y, z] = self.dirs.map(|axis| axis.size());
+        let least = least_direction(x.fast_max(y).fast_max(z));
         for k in 0..3 {
             let Interval { low, high } = self.dirs[k];
             let (down, up) = (live & Mask8::lt(low, Float8::ZERO), live & Mask8::gt(high, Float8::ZERO));
             (split[k], back[k]) = (down.any() && up.any(), down.any() && !up.any());
-            let least = float8(LEAST_DIRECTION);
             let (one, outward) = (float8(1.0), float8(OUTWARD));
             (beam.inv_near[k], beam.inv_far[k]) = match (back[k], split[k]) {
                 (false, false) => (one / high.fast_max(least), outward / low.fast_max(least)),

@@ -1,7 +1,7 @@
 //! One ray with all that its way down the tree takes.
 
 use super::leaf::Best;
-use super::node::{LEAST_DIRECTION, OUTWARD, reach};
+use super::node::{OUTWARD, least_direction, reach};
 use crate::lanes::{Float8, LANES, Mask8, RayPacket, Vec3x8, float8};
 use crate::shapes::RowRef;
 
@@ -31,7 +31,9 @@ impl Line {
     #[inline(always)]
     pub fn of_packet(rays: &RayPacket, [hits, places, lows]: [Float8; 3]) -> ([Line; LANES], [u8; LANES]) {
         let (origin, dir) = ([rays.origin.x, rays.origin.y, rays.origin.z], [rays.dir.x, rays.dir.y, rays.dir.z]);
-        let [x, y, z] = dir.map(inverse);
+        let [x, y, z] = dir.map(|d| d.abs());
+        let least = least_direction(x.fast_max(y).fast_max(z));
+        let [x, y, z] = dir.map(|d| inverse(d, least));
         let way = [origin[0], origin[1], origin[2], rays.t_min, x, y, z, reach(rays.t_max)];
         let ray = [dir[0], dir[1], dir[2], rays.inv_dd, rays.t_max, hits, places, lows];
         let (way, ray) = (Float8::transpose(way), Float8::transpose(ray));
@@ -102,7 +104,7 @@ impl Line {
 
 /// `1 / d`, short of infinity.
 #[inline(always)]
-fn inverse(d: Float8) -> Float8 {
-    let magnitude = float8(1.0) / d.abs().fast_max(float8(LEAST_DIRECTION));
+fn inverse(d: Float8, least: Float8) -> Float8 {
+    let magnitude = float8(1.0) / d.abs().fast_max(least);
     Mask8::sign(d).select(-magnitude, magnitude)
 }

@@ -150,9 +150,15 @@ pub struct Beam {
     pub start: Float8,
 }
 
-/// Directions closer to zero than this count as this: nothing overflows to NaN, and a ray along a slab
-/// stays within it.
-pub const LEAST_DIRECTION: f32 = 1e-30;
+/// Coordinates of a direction closer to zero than this share of the largest one count as that: nothing overflows to
+/// NaN, and a ray along a slab stays within it.
+const LEAST_DIRECTION: f32 = 1e-30;
+
+/// The least that coordinates of directions count as, where the largest of them is `largest`.
+#[inline(always)]
+pub fn least_direction(largest: Float8) -> Float8 {
+    (largest * float8(LEAST_DIRECTION)).fast_max(float8(f32::MIN_POSITIVE))
+}
 
 /// What inverses of far planes are longer by, so that no hit is lost to rounding (Ize, "Robust BVH ray traversal",
 /// Journal of Computer Graphics Techniques 2(2), 2013, needs 4 roundings).

@@ -52,7 +52,8 @@ impl Direct<'_> {
         record: &mut R,
     ) {
         let (rays, stores) = (&wave.tile.packets[p], self.tree.stores());
-        let (mut surface, owners) = stores.surface::<false>(wave.tile.hits[p], rays, rays.t_max);
+        let before = wave.tile.exact.as_ref().map(|exact| &exact[p]);
+        let (mut surface, owners) = stores.surface::<false>(wave.tile.hits[p], rays, rays.t_max, before);
         let owners = &owners;
         let first = exact.len();
         if self.goes_on() {

@@ -14,7 +14,7 @@ pub struct RayPacket {
     pub t_min: Float8,
     /// Closed ends.
     pub t_max: Float8,
-    /// `1 / (dir . dir)`.
+    /// `1 / (dir . dir)`; NaN, which leaves all open that is made of it, where f32 does not hold such squares well.
     pub inv_dd: Float8,
 }
 
@@ -36,7 +36,7 @@ impl RayPacket {
     /// Eight rays with ends, which tell the dead ones.
     #[inline(always)]
     pub fn within(origin: Vec3x8, dir: Vec3x8, t_min: Float8, t_max: Float8) -> Self {
-        RayPacket { origin, dir, t_min, t_max, inv_dd: float8(1.0) / dir.dot(dir) }
+        RayPacket { origin, dir, t_min, t_max, inv_dd: inverse_square(dir) }
     }
 
     /// Up to eight rays; what is missing or invalid is dead.
@@ -50,7 +50,7 @@ impl RayPacket {
             dir,
             t_min: Float8::from(rays.map(|ray| ray.t_min)),
             t_max: Float8::from(rays.map(|ray| ray.t_max)),
-            inv_dd: float8(1.0) / dir.dot(dir),
+            inv_dd: inverse_square(dir),
         }
     }
 
@@ -58,13 +58,7 @@ impl RayPacket {
     #[inline(always)]
     pub fn splat(ray: &Ray) -> Self {
         let (origin, dir) = (Vec3x8::splat(ray.origin), Vec3x8::splat(ray.dir));
-        RayPacket {
-            origin,
-            dir,
-            t_min: float8(ray.t_min),
-            t_max: float8(ray.t_max),
-            inv_dd: float8(1.0) / dir.dot(dir),
-        }
+        RayPacket { origin, dir, t_min: float8(ray.t_min), t_max: float8(ray.t_max), inv_dd: inverse_square(dir) }
     }
 
     /// The ray of one lane in all lanes.
@@ -113,6 +107,16 @@ impl RayPacket {
     pub fn live(&self) -> Mask8 {
         Mask8::lt(self.t_min, self.t_max)
     }
+}
+
+/// Directions whose squares, and products of those with squares of places, neither vanish nor overflow.
+const SQUARES: [f32; 2] = [1e-30, 1e30];
+
+#[inline(always)]
+fn inverse_square(dir: Vec3x8) -> Float8 {
+    let dd = dir.dot(dir);
+    let held = Mask8::ge(dd, float8(SQUARES[0])) & Mask8::le(dd, float8(SQUARES[1]));
+    held.select(float8(1.0) / dd, float8(f32::NAN))
 }
 
 /// What eight (ray, primitive) pairs came to.

@@ -169,6 +169,8 @@ pub struct CylinderPart {
 pub struct ConePart {
     /// Centre of the lower rim.
     pub base: DVec3,
+    /// Centre of the upper rim.
+    pub apex: DVec3,
     /// Unit, toward the upper rim.
     pub axis: DVec3,
     /// Scene units.
@@ -190,17 +192,22 @@ impl TurnedBoxPart {
 
 impl ConePart {
     /// Centre of the narrower end and the unit axis from there to the wider one: where the radius comes near
-    /// zero, heights must too, or nothing of it is left in f32.
+    /// zero, heights must too, or nothing of it is left.
     pub fn narrow_end(&self) -> (DVec3, DVec3) {
         match self.apex_radius < self.radius {
-            true => (self.base + self.axis * self.height, -self.axis),
+            true => (self.apex, -self.axis),
             false => (self.base, self.axis),
         }
     }
 
-    /// Change of the radius per unit of height.
-    pub fn slope(&self) -> f64 {
-        (self.apex_radius - self.radius) / self.height
+    /// The radius there.
+    pub fn narrow_radius(&self) -> f64 {
+        self.radius.min(self.apex_radius)
+    }
+
+    /// Growth of the radius per unit of height from there.
+    pub fn growth(&self) -> f64 {
+        (self.apex_radius - self.radius).abs() / self.height
     }
 }
 
@@ -265,8 +272,8 @@ impl Parts {
             Shape::Cone(Cone { base, apex, radius, apex_radius, caps }) => {
                 let mantle = Mantle::new(*base - origin, *apex - *base, [*radius, *apex_radius]);
                 let Mantle { base, axis, height, .. } = mantle;
-                let (radius, apex_radius) = (*radius, *apex_radius);
-                self.cones.push(ConePart { base, axis, height, radius, apex_radius, owner });
+                let (apex, radius, apex_radius) = (*apex - origin, *radius, *apex_radius);
+                self.cones.push(ConePart { base, apex, axis, height, radius, apex_radius, owner });
                 self.add_caps(&mantle, *caps, owner);
             }
         }

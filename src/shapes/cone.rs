@@ -2,9 +2,9 @@
 
 use glam::{DVec2, DVec3};
 
-use super::cylinder::about_axis;
+use super::cylinder::{about_axis, ends_missed, of_mantle};
 use super::sphere::copysign;
-use super::{Hidden8, Part, Ray64, Surface8, Surface64, nearer, roundings};
+use super::{Hidden8, Part, Ray64, Surface8, Surface64, VANISHED, VANISHING, roundings};
 use crate::lanes::{Float8, Hit8, Mask8, RayPacket, Vec3x8, difference_of_products, float8};
 use crate::plan::{ConePart, Owner};
 use crate::scene::Visible;
@@ -27,14 +27,14 @@ impl Part for ConePart {
 
     fn row(&self) -> ([DVec3; 2], [f64; 3]) {
         let (tip, axis) = self.narrow_end();
-        ([tip, axis], [self.height, self.radius.min(self.apex_radius), self.slope().abs()])
+        ([tip, axis], [self.height, self.narrow_radius(), self.growth()])
     }
 
     #[inline(always)]
     fn anchor<'a>(rows: &Self::Rows, origin: &Vec3x8, _: impl Fn(usize) -> Option<&'a Self>) -> Anchor {
         let ([tip, axis], [height, radius, slope]) = *rows;
         let f = tip - *origin;
-        let error = roundings(4.0) * (tip.abs() + f.abs()).sum();
+        let error = roundings(4.0).mul_add((tip.abs() + f.abs()).sum(), float8(VANISHING));
         Anchor { f, error, axis, height, radius, slope }
     }
 
@@ -64,9 +64,10 @@ impl Part for ConePart {
             moved = error + roundings(8.0) * (g.abs().sum() + radius);
             let turned = roundings(8.0) * length;
             bound = speed2 * size * (float8(6.0).mul_add(moved, roundings(20.0) * size));
-            bound += float8(6.0) * speed2.sqrt() * size * size * turned;
+            bound += float8(6.0) * speed2.sqrt() * size * size * turned + float8(VANISHED);
         }
-        let possible = Mask8::ge(disc, -bound);
+        // Where squares overflow or vanish all is open.
+        let possible = if CERTIFY { !Mask8::lt(disc, -bound) } else { Mask8::ge(disc, Float8::ZERO) };
         if !possible.any() {
             return Hit8::none();
         }
@@ -111,7 +112,7 @@ impl Part for ConePart {
         if CERTIFY {
             // With a near 0 the one root is far away and of no certain sign.
             let vague = Mask8::le(a.abs(), speed2 * roundings(16.0) + roundings(32.0) * length * speed2.sqrt());
-            let silhouette = possible & Mask8::le(disc.abs(), bound);
+            let silhouette = possible & !Mask8::gt(disc.abs(), bound);
             let widest = slope.mul_add(height, radius);
             let half = (size + size + widest + widest + moved) / speed2.sqrt();
             let near_ray = !Mask8::le(p + half, rays.t_min) & !Mask8::gt(p - half, rays.t_max);
@@ -122,27 +123,32 @@ impl Part for ConePart {
     }
 
     fn decide(&self, ray: &Ray64, visible: Visible) -> Option<f64> {
-        let Quadratic { a, b, disc, mut roots } = Quadratic::new(self, ray);
+        let quadratic = Quadratic::new(self, ray);
+        let mut roots = quadratic.roots;
         roots.sort_by(f64::total_cmp);
-        let keep = |t: &f64| {
-            let enters = a * t + b < 0.0;
+        let keep = |s: &f64| {
+            let enters = quadratic.a * s + quadratic.b < 0.0;
             let shown = visible == Visible::Both || enters == (visible == Visible::Front);
-            let w = (ray.at(*t) - self.base).dot(self.axis);
-            shown && ray.accepts(*t) && (0.0..=self.height).contains(&w)
+            shown && ray.accepts(quadratic.p + s) && (0.0..=self.height).contains(&quadratic.height(*s))
         };
-        roots.into_iter().find(keep).filter(|_| disc >= 0.0)
+        roots.into_iter().find(keep).filter(|_| quadratic.disc >= 0.0).map(|s| quadratic.p + s)
     }
 
-    fn refine(&self, ray: &Ray64, t: f64) -> Surface64 {
-        let Quadratic { roots: [a, b], .. } = Quadratic::new(self, ray);
-        let t = nearer(a, b, t);
-        let from_base = ray.at(t) - self.base;
-        let w = from_base.dot(self.axis);
+    fn refine(&self, ray: &Ray64, t: f64, visible: Visible) -> Surface64 {
+        let quadratic = Quadratic::new(self, ray);
+        let Quadratic { p, g, roots, .. } = quadratic;
+        let off = |t: f64| ends_missed(quadratic.height(t - p), self.height);
+        let t = of_mantle(roots.map(|s| p + s), off, t, visible);
+        // The root as it was before it was rounded to a place on the ray.
+        let s = if p + roots[0] == t { roots[0] } else { roots[1] };
+        let (tip, axis) = self.narrow_end();
+        let from_tip = s * ray.dir + g;
+        let w = from_tip.dot(axis);
         // At the tip there is no radial direction; the way out along the axis stands in for it.
-        let radial = (from_base - self.axis * w).try_normalize();
-        let normal = (radial.unwrap_or(-self.narrow_end().1) - self.axis * self.slope()).normalize();
-        let rho = (self.radius + self.slope() * w).max(0.0);
-        Surface64 { t, point: self.base + self.axis * w + radial.unwrap_or_default() * rho, normal }
+        let radial = (from_tip - axis * w).try_normalize();
+        let normal = (radial.unwrap_or(-axis) - axis * self.growth()).normalize();
+        let rho = (self.narrow_radius() + self.growth() * w).max(0.0);
+        Surface64 { t, point: tip + axis * w + radial.unwrap_or_default() * rho, normal }
     }
 
     fn surface(rows: &Self::Rows, rays: &RayPacket, t: Float8) -> Surface8 {
@@ -160,7 +166,7 @@ impl Part for ConePart {
         let rho = slope.mul_add(w, radius).fast_max(Float8::ZERO);
         let point = radial.mul_add(at_tip.select(Float8::ZERO, rho), axis.mul_add(w, tip));
         let error = roundings(6.0) * (tip.abs().sum() + height + radius + rho);
-        Surface8 { point, normal, error }
+        Surface8::sure(point, normal, error)
     }
 
     fn uv(&self, point: DVec3) -> DVec2 {
@@ -170,9 +176,8 @@ impl Part for ConePart {
     fn bounds(&self) -> (DVec3, DVec3) {
         let a = self.axis;
         let half = DVec3::new(a.y.hypot(a.z), a.z.hypot(a.x), a.x.hypot(a.y));
-        let apex = self.base + a * self.height;
         let (low, high) = (half * self.radius, half * self.apex_radius);
-        ((self.base - low).min(apex - high), (self.base + low).max(apex + high))
+        ((self.base - low).min(self.apex - high), (self.base + low).max(self.apex + high))
     }
 
     fn owner(&self) -> Owner {
@@ -180,9 +185,16 @@ impl Part for ConePart {
     }
 }
 
-/// `A t^2 + 2 B t + C = 0` in f64, from the point nearest the base, which is added back to the roots.
+/// `A s^2 + 2 B s + C = 0` in f64, where s counts from the point nearest the narrower end: beside a tip all is as small
+/// as what is to be told apart.
 struct Quadratic {
-    /// With `b`: `a t + b` is negative where a root at `t` enters.
+    /// Where on the ray that point is.
+    p: f64,
+    /// From the narrower end to that point.
+    g: DVec3,
+    /// The same along the axis, and the direction.
+    along: [f64; 2],
+    /// With `b`: `a s + b` is negative where a root at `s` enters.
     a: f64,
     b: f64,
     disc: f64,
@@ -191,17 +203,23 @@ struct Quadratic {
 
 impl Quadratic {
     fn new(part: &ConePart, ray: &Ray64) -> Self {
-        let k = part.slope();
-        let p = (part.base - ray.origin).dot(ray.dir) / ray.dir.length_squared();
-        let g = ray.at(p) - part.base;
-        let (gw, dw) = (g.dot(part.axis), ray.dir.dot(part.axis));
-        let (gx, dx) = (g - part.axis * gw, ray.dir - part.axis * dw);
-        let rho = part.radius + k * gw;
+        let ((tip, axis), k, d) = (part.narrow_end(), part.growth(), ray.dir);
+        let f = tip - ray.origin;
+        let p = f.dot(d) / d.length_squared();
+        let g = DVec3::new(p.mul_add(d.x, -f.x), p.mul_add(d.y, -f.y), p.mul_add(d.z, -f.z));
+        let (gw, dw) = (g.dot(axis), d.dot(axis));
+        let (gx, dx) = (g - axis * gw, d - axis * dw);
+        let rho = part.narrow_radius() + k * gw;
         let a = dx.length_squared() - (k * dw).powi(2);
         let b = dx.dot(gx) - k * dw * rho;
         let c = gx.length_squared() - rho * rho;
         let disc = b * b - a * c;
         let z = -(b + disc.max(0.0).sqrt().copysign(b));
-        Quadratic { a, b: b - a * p, disc, roots: [p + z / a, p + c / z] }
+        Quadratic { p, g, along: [gw, dw], a, b, disc, roots: [z / a, c / z] }
+    }
+
+    /// The height above the narrower end.
+    fn height(&self, s: f64) -> f64 {
+        s.mul_add(self.along[1], self.along[0])
     }
 }

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::{Hidden8, Part, Ray64, Surface8, Surface64, nearer, roundings};
-use crate::lanes::{Float8, Hit8, Mask8, RayPacket, UNIT_ROUNDOFF, Vec3x8, float8};
+use crate::lanes::{Float8, Hit8, LANES, Mask8, RayPacket, UNIT_ROUNDOFF, Vec3x8, float8};
 use crate::plan::{BoxPart, Owner};
 use crate::scene::Visible;
 
@@ -43,18 +43,22 @@ impl Part for BoxPart {
         (entry <= exit).then(|| ray.first(entry, exit, visible)).flatten()
     }
 
-    fn refine(&self, ray: &Ray64, t: f64) -> Surface64 {
-        let (entry, exit) = slabs64(self.min - ray.origin, self.max - ray.origin, ray.dir);
-        let t = nearer(entry, exit, t);
-        let (point, normal) = face64(self.min, self.max, ray.at(t));
+    fn refine(&self, ray: &Ray64, t: f64, visible: Visible) -> Surface64 {
+        let (t, axis, upper) = face64(self.min - ray.origin, self.max - ray.origin, ray.dir, t, visible);
+        let (mut point, mut normal) = (ray.at(t), DVec3::ZERO);
+        point[axis] = if upper { self.max[axis] } else { self.min[axis] };
+        normal[axis] = if upper { 1.0 } else { -1.0 };
         Surface64 { t, point, normal }
     }
 
     #[inline(always)]
-    fn surface([min, max]: &[Vec3x8; 2], rays: &RayPacket, t: Float8) -> Surface8 {
-        let (point, normal) = face(*min, *max, rays.dir.mul_add(t, rays.origin));
+    fn surface(rows: &[Vec3x8; 2], rays: &RayPacket, t: Float8) -> Surface8 {
+        let Anchor { min, max, error } = Self::anchor(rows, &rays.origin, |_| None);
+        let face = Face::at(t, [min, max, error], rays.dir, Float8::ZERO);
+        let [min, max] = *rows;
+        let (point, normal) = face.put(min, max, rays.dir.mul_add(t, rays.origin));
         let reach = point.abs() + (min.abs() + max.abs());
-        Surface8 { point, normal, error: roundings(2.0) * normal.abs().dot(reach) }
+        Surface8 { point, normal, error: roundings(2.0) * normal.abs().dot(reach), vague: face.vague }
     }
 
     fn uv(&self, point: DVec3) -> DVec2 {
@@ -190,36 +194,105 @@ pub(super) fn slabs64(min: DVec3, max: DVec3, dir: DVec3) -> (f64, f64) {
     (entry, exit)
 }
 
-/// Puts points on the nearest face; ties go to the lowest axis. The normal is that face's.
-#[inline(always)]
-pub(super) fn face(min: Vec3x8, max: Vec3x8, point: Vec3x8) -> (Vec3x8, Vec3x8) {
-    let axis = |lo: Float8, hi: Float8, x: Float8| {
-        let (below, above) = ((x - lo).abs(), (x - hi).abs());
-        let low = Mask8::le(below, above);
-        (below.fast_min(above), low.select(lo, hi), low.select(float8(-1.0), float8(1.0)))
-    };
-    let x = axis(min.x, max.x, point.x);
-    let y = axis(min.y, max.y, point.y);
-    let z = axis(min.z, max.z, point.z);
-    let on_x = Mask8::le(x.0, y.0) & Mask8::le(x.0, z.0);
-    let on_y = !on_x & Mask8::le(y.0, z.0);
-    let on_z = !on_x & !on_y;
-    let zero = Float8::ZERO;
-    let normal = Vec3x8::new(on_x.select(x.2, zero), on_y.select(y.2, zero), on_z.select(z.2, zero));
-    let point = Vec3x8::new(on_x.select(x.1, point.x), on_y.select(y.1, point.y), on_z.select(z.1, point.z));
-    (point, normal)
+/// The face that was met, in each lane one of six.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Face {
+    /// Lanes in which it lies across an axis.
+    across: [Mask8; 3],
+    /// Lanes in which it is the upper one of its axis, by axis.
+    upper: [Mask8; 3],
+    /// Lanes in which it may as well be another one.
+    pub vague: Mask8,
 }
 
-/// [`face`] in f64.
-pub(super) fn face64(min: DVec3, max: DVec3, mut point: DVec3) -> (DVec3, DVec3) {
-    let (below, above) = ((point - min).abs(), (point - max).abs());
-    let gap = below.min(above);
-    let axis = (0..3).fold(0, |best, k| if gap[k] < gap[best] { k } else { best });
-    let low = below[axis] <= above[axis];
-    point[axis] = if low { min[axis] } else { max[axis] };
-    let mut normal = DVec3::ZERO;
-    normal[axis] = if low { -1.0 } else { 1.0 };
-    (point, normal)
+impl Face {
+    /// The face that gave `t`: as for [`Stretch::new`] entry or exit, whichever is nearer, and of equal ones the lowest
+    /// axis. Which face a point is nearest to would not tell: it may lie on two, or beyond the far one of a thin box.
+    #[inline(always)]
+    pub fn at(t: Float8, [min, max, error]: [Vec3x8; 3], dir: Vec3x8, turned: Float8) -> Self {
+        let axes = [(min.x, max.x, error.x, dir.x), (min.y, max.y, error.y, dir.y), (min.z, max.z, error.z, dir.z)];
+        let (mut entry, mut exit) = (End::NONE, End::NONE);
+        let mut vague = Mask8::NONE;
+        for (k, (lo, hi, error, d)) in axes.into_iter().enumerate() {
+            let (back, along) = (Mask8::sign(d), Mask8::le(d.abs(), turned));
+            let never = float8(f32::NEG_INFINITY);
+            let near = along.select(never, back.select(hi, lo) / d);
+            let far = along.select(never, -back.select(lo, hi) / d);
+            let inv = along.select(Float8::ZERO, float8(1.0) / (d.abs() - turned));
+            let off = |place: Float8| along.select(Float8::ZERO, turned.mul_add(place.abs(), error) * inv);
+            entry.take(k, near, off(near));
+            exit.take(k, far, off(far));
+            vague |= along & Mask8::gt(turned, Float8::ZERO);
+        }
+        let leaves = Mask8::lt((t + exit.last).abs(), (t - entry.last).abs());
+        let one_of = |a: Mask8, b: Mask8| (leaves & a) | (!leaves & b);
+        // A box that is thinner than that: entry or exit.
+        let thin = !Mask8::gt(-exit.last - entry.last, float8(2.0) * (entry.error + exit.error));
+        vague |= thin | one_of(exit.vague(), entry.vague());
+        let across = std::array::from_fn(|k| one_of(exit.axes[k], entry.axes[k]));
+        let upper = [dir.x, dir.y, dir.z].map(|d| one_of(!Mask8::sign(d), Mask8::sign(d)));
+        Face { across, upper, vague }
+    }
+
+    /// Puts points on it; with its normal.
+    #[inline(always)]
+    pub fn put(&self, min: Vec3x8, max: Vec3x8, point: Vec3x8) -> (Vec3x8, Vec3x8) {
+        let axis = |k: usize, lo: Float8, hi: Float8, x: Float8| {
+            let (on, up) = (self.across[k], self.upper[k]);
+            let normal = on.select(up.select(float8(1.0), float8(-1.0)), Float8::ZERO);
+            (on.select(up.select(hi, lo), x), normal)
+        };
+        let x = axis(0, min.x, max.x, point.x);
+        let y = axis(1, min.y, max.y, point.y);
+        let z = axis(2, min.z, max.z, point.z);
+        (Vec3x8::new(x.0, y.0, z.0), Vec3x8::new(x.1, y.1, z.1))
+    }
+}
+
+/// The last of the places where a ray gets behind the faces that it meets from without.
+struct End {
+    last: Float8,
+    error: Float8,
+    /// The greatest that any other place may be.
+    rival: Float8,
+    axes: [Mask8; 3],
+}
+
+impl End {
+    const NONE: End = {
+        let never = Float8::new([f32::NEG_INFINITY; LANES]);
+        End { last: never, error: Float8::ZERO, rival: never, axes: [Mask8::NONE; 3] }
+    };
+
+    #[inline(always)]
+    fn take(&mut self, axis: usize, place: Float8, error: Float8) {
+        let later = Mask8::gt(place, self.last);
+        let (other, its_error) = (later.select(self.last, place), later.select(self.error, error));
+        self.rival = self.rival.fast_max(other + its_error);
+        self.last = later.select(place, self.last);
+        self.error = later.select(error, self.error);
+        self.axes.iter_mut().for_each(|mask| *mask &= !later);
+        self.axes[axis] = later;
+    }
+
+    /// Lanes in which another place may be the last.
+    #[inline(always)]
+    fn vague(&self) -> Mask8 {
+        !Mask8::lt(self.rival, self.last - self.error)
+    }
+}
+
+/// [`Face`] of one ray in f64, and its `t`: the axis, and whether it is the upper one.
+pub(super) fn face64(min: DVec3, max: DVec3, dir: DVec3, t: f64, visible: Visible) -> (f64, usize, bool) {
+    let (entry, exit) = slabs64(min, max, dir);
+    let t = nearer(entry, exit, t, visible);
+    let leaves = t != entry || (entry == exit && visible == Visible::Back);
+    let place = |k: usize| {
+        let (a, b) = (min[k] / dir[k], max[k] / dir[k]);
+        if leaves { a.max(b) } else { a.min(b) }
+    };
+    let axis = (0..3).find(|k| dir[*k] != 0.0 && place(*k) == t).unwrap_or(0);
+    (t, axis, (dir[axis] > 0.0) == leaves)
 }
 
 /// 0 to 1 along the two axes after the face's own, in cyclic order.

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 
 use super::sphere::copysign;
-use super::{Hidden8, Part, Ray64, Surface8, Surface64, nearer, roundings};
-use crate::lanes::{Float8, Hit8, Mask8, RayPacket, Vec3x8};
+use super::{Hidden8, Part, Ray64, Surface8, Surface64, VANISHING, nearer, roundings};
+use crate::lanes::{Float8, Hit8, Mask8, RayPacket, UNIT_ROUNDOFF, Vec3x8, float8};
 use crate::plan::{CylinderPart, Owner};
 use crate::scene::{Visible, basis};
 
@@ -34,7 +34,7 @@ impl Part for CylinderPart {
     fn anchor<'a>(rows: &Self::Rows, origin: &Vec3x8, _: impl Fn(usize) -> Option<&'a Self>) -> Anchor {
         let ([base, axis], [height, radius]) = *rows;
         let f = base - *origin;
-        let error = roundings(6.0) * ((base.abs() + f.abs()).sum() + height);
+        let error = roundings(6.0).mul_add((base.abs() + f.abs()).sum() + height, float8(VANISHING));
         let slip = roundings(13.0).mul_add(f.abs().sum(), error);
         Anchor { f, axis, height, r2: radius * radius, error, slip }
     }
@@ -113,7 +113,7 @@ impl Part for CylinderPart {
     fn decide(&self, ray: &Ray64, visible: Visible) -> Option<f64> {
         let (disc, [a, b]) = roots(self, ray);
         let keep = |t: &f64| {
-            let w = (ray.at(*t) - self.base).dot(self.axis);
+            let w = (*t * ray.dir - (self.base - ray.origin)).dot(self.axis);
             (0.0..=self.height).contains(&w) && ray.accepts(*t)
         };
         let entry = Some(a.min(b)).filter(keep).filter(|_| visible != Visible::Back);
@@ -121,10 +121,12 @@ impl Part for CylinderPart {
         first.filter(|_| disc >= 0.0)
     }
 
-    fn refine(&self, ray: &Ray64, t: f64) -> Surface64 {
+    fn refine(&self, ray: &Ray64, t: f64, visible: Visible) -> Surface64 {
+        let f = self.base - ray.origin;
         let (_, [a, b]) = roots(self, ray);
-        let t = nearer(a, b, t);
-        let from_base = ray.at(t) - self.base;
+        let off = |t: f64| ends_missed((t * ray.dir - f).dot(self.axis), self.height);
+        let t = of_mantle([a, b], off, t, visible);
+        let from_base = t * ray.dir - f;
         let w = from_base.dot(self.axis);
         let normal = (from_base - self.axis * w).normalize();
         Surface64 { t, point: self.base + self.axis * w + normal * self.radius, normal }
@@ -139,7 +141,7 @@ impl Part for CylinderPart {
         let normal = axis.mul_add(-w, from_base).normalize();
         let point = normal.mul_add(radius, axis.mul_add(w, base));
         let error = roundings(6.0) * (base.abs().sum() + height + radius);
-        Surface8 { point, normal, error }
+        Surface8::sure(point, normal, error)
     }
 
     fn uv(&self, point: DVec3) -> DVec2 {
@@ -167,6 +169,19 @@ fn roots(part: &CylinderPart, ray: &Ray64) -> (f64, [f64; 2]) {
     let disc = part.radius * part.radius * dd - f.cross(d).length_squared();
     let z = fd + disc.max(0.0).sqrt().copysign(fd);
     (disc, [z / dd, (f.length() - part.radius) * (f.length() + part.radius) / z])
+}
+
+/// How far a height is beyond the ends of a mantle.
+pub(super) fn ends_missed(w: f64, height: f64) -> f64 {
+    (-w).max(w - height).max(0.0)
+}
+
+/// The root near `t` that was met: [`nearer`], unless one of two is that much further beyond the ends of the mantle.
+pub(super) fn of_mantle([a, b]: [f64; 2], off: impl Fn(f64) -> f64, t: f64, visible: Visible) -> f64 {
+    let t = nearer(a, b, t, visible);
+    let other = if t == a { b } else { a };
+    let close = (other - t).abs() <= 16.0 * f64::from(UNIT_ROUNDOFF) * t.abs();
+    if close && off(other) < off(t) { other } else { t }
 }
 
 /// u = azimuth/2pi in the basis of the axis, v = share of the height.

@@ -6,8 +6,8 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 
 use super::plane::{Crossing, flat_surface, flat_surface64, height_error, shows, side_hidden};
-use super::{Hidden8, Part, Ray64, Surface8, Surface64, roundings};
-use crate::lanes::{Float8, Hit8, Mask8, RayPacket, Vec3x8};
+use super::{Hidden8, Part, Ray64, Surface8, Surface64, VANISHING, roundings};
+use crate::lanes::{Float8, Hit8, Mask8, RayPacket, Vec3x8, float8};
 use crate::plan::{DiskPart, Owner};
 use crate::scene::{Visible, basis};
 
@@ -45,7 +45,8 @@ impl Part for DiskPart {
     #[inline(always)]
     fn hit<const CULL: bool, const CERTIFY: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
         let nd = anchor.normal.dot(rays.dir);
-        let crossing = Crossing::new::<CERTIFY>(anchor.height, anchor.error, nd, rays.dir.abs().sum());
+        let length = rays.dir.abs().sum(); // no shorter than the direction
+        let crossing = Crossing::new::<CERTIFY>(anchor.height, anchor.error, nd, length);
         let (mut on_ray, mut open) = crossing.on::<CERTIFY>(rays);
         if CULL {
             on_ray &= !side_hidden(nd, hidden) | open;
@@ -59,8 +60,7 @@ impl Part for DiskPart {
         let mut doubt = Mask8::NONE;
         if CERTIFY {
             // The error of t moves x along the ray; the rest is what center, origin and direction round by.
-            let len = rays.dir.dot(rays.dir).sqrt();
-            let shift = (crossing.error * len).mul_add(Float8::ONE, roundings(4.0) * anchor.reach);
+            let shift = crossing.error.mul_add(length, roundings(4.0).mul_add(anchor.reach, float8(VANISHING)));
             let near_rim = |r: Float8| {
                 let shift = roundings(8.0).mul_add(r, shift);
                 Mask8::le((rho2 - r * r).abs(), shift * (r + r + shift) * Float8::splat(1.25))
@@ -86,7 +86,7 @@ impl Part for DiskPart {
         (rho <= self.radius + bound && rho >= self.inner - bound).then_some(t)
     }
 
-    fn refine(&self, ray: &Ray64, _: f64) -> Surface64 {
+    fn refine(&self, ray: &Ray64, _: f64, _: Visible) -> Surface64 {
         flat_surface64(self.center, self.normal, ray)
     }
 

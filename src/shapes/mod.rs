@@ -26,7 +26,7 @@ use glam::{DVec2, DVec3};
 pub use self::store::{Hidden8, Store};
 pub use self::stores::{Groups, RowRef, Stores, Visit};
 
-use crate::lanes::{Columns, ExactPacket, Float8, Hit8, Mask8, Ray, RayPacket, Vec3x8, float8};
+use crate::lanes::{Columns, ExactPacket, Float8, Hit8, Mask8, Ray, RayPacket, UNIT_ROUNDOFF, Vec3x8, float8};
 use crate::plan::Owner;
 use crate::scene::Visible;
 
@@ -48,14 +48,19 @@ pub trait Part: Clone + Send + Sync {
     fn hit<const CULL: bool, const CERTIFY: bool>(anchor: &Self::Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8;
     /// The f64 answer where the kernel is in doubt: touching counts as a hit.
     fn decide(&self, ray: &Ray64, visible: Visible) -> Option<f64>;
-    /// The hit near `t` again, in f64.
-    fn refine(&self, ray: &Ray64, t: f64) -> Surface64;
+    /// The hit near `t` again, in f64; of two that f32 cannot tell apart the first one of a side that is seen.
+    fn refine(&self, ray: &Ray64, t: f64, visible: Visible) -> Surface64;
     /// Where the rays are at `t`, put on the surface.
     fn surface(rows: &Self::Rows, rays: &RayPacket, t: Float8) -> Surface8;
     /// Texture coordinates of a point on the part.
     fn uv(&self, point: DVec3) -> DVec2;
     /// Bounds: lower and upper corner.
     fn bounds(&self) -> (DVec3, DVec3);
+    /// The largest distance from a point, by coordinate, of what the part is made of.
+    fn reach(&self, from: DVec3) -> f64 {
+        let (low, high) = self.bounds();
+        (low - from).abs().max((high - from).abs()).max_element()
+    }
     /// Whose part it is.
     fn owner(&self) -> Owner;
 }
@@ -69,10 +74,19 @@ pub struct Surface8 {
     pub normal: Vec3x8,
     /// Bound on the distance of `point` from the exact surface, scene units.
     pub error: Float8,
+    /// Lanes in which f32 cannot tell which face of several was met.
+    pub vague: Mask8,
 }
 
 impl Surface8 {
-    const NOTHING: Surface8 = Surface8 { point: Vec3x8::ZERO, normal: Vec3x8::ZERO, error: Float8::ZERO };
+    const NOTHING: Surface8 =
+        Surface8 { point: Vec3x8::ZERO, normal: Vec3x8::ZERO, error: Float8::ZERO, vague: Mask8::NONE };
+
+    /// All of which is certain up to its error.
+    #[inline(always)]
+    fn sure(point: Vec3x8, normal: Vec3x8, error: Float8) -> Self {
+        Surface8 { point, normal, error, vague: Mask8::NONE }
+    }
 
     /// With the lanes of `mask` from `other`.
     fn with(&self, mask: Mask8, other: &Surface8) -> Surface8 {
@@ -80,7 +94,14 @@ impl Surface8 {
             point: Vec3x8::select(mask, other.point, self.point),
             normal: Vec3x8::select(mask, other.normal, self.normal),
             error: mask.select(other.error, self.error),
+            vague: (self.vague & !mask) | (other.vague & mask),
         }
+    }
+
+    /// Takes a lane from f64.
+    fn set(&mut self, lane: usize, exact: &Surface64) {
+        self.point.set_lane(lane, exact.point.as_vec3().to_array());
+        self.normal.set_lane(lane, exact.normal.as_vec3().to_array());
     }
 }
 
@@ -146,26 +167,38 @@ impl Ray64 {
 }
 
 /// What f64 may be off by where a ray meets a part at `t`: some roundings of all the numbers involved, over the cosine
-/// at which the ray meets the surface.
+/// at which the ray meets the surface. Those are differences from the origin of the ray: where that lies does not count.
 pub fn noise<P: Part>(part: &P, ray: &Ray64, t: f64) -> f64 {
     let way = t.abs() * ray.dir.abs().element_sum();
-    let (low, high) = part.bounds();
-    let extent = low.abs().max(high.abs()).max_element();
-    let extent = if extent.is_finite() { extent } else { 0.0 };
-    let moved = 16.0 * f64::EPSILON * (ray.origin.abs().element_sum() + way + extent);
-    let speed = part.refine(ray, t).normal.dot(ray.dir).abs();
+    let moved = 16.0 * f64::EPSILON * (part.reach(ray.origin) + way);
+    let speed = part.refine(ray, t, Visible::Both).normal.dot(ray.dir).abs();
     let noise = moved / speed;
     // Where a ray grazes a round surface the square root of it is what opens.
     if noise.is_finite() { noise.min(1e-6 * t.abs() + moved) } else { 1e-6 * t.abs() }
 }
 
-/// The one of two roots that is nearer to `t`.
-fn nearer(a: f64, b: f64, t: f64) -> f64 {
-    if (a - t).abs() <= (b - t).abs() { a } else { b }
+/// The one of two roots that is nearer to `t`, which f32 may have rounded; where that cannot tell them apart the first
+/// one, or the last one where only backs are seen.
+fn nearer(a: f64, b: f64, t: f64, visible: Visible) -> f64 {
+    let (first, last) = (a.min(b), a.max(b));
+    let rounded = 16.0 * f64::from(UNIT_ROUNDOFF) * t.abs();
+    match (last - first <= rounded, visible) {
+        (true, Visible::Both | Visible::Front) => first,
+        (true, Visible::Back) => last,
+        (false, _) if (first - t).abs() <= (last - t).abs() => first,
+        (false, _) => last,
+    }
 }
 
-/// The half-width of a decision's doubt, in units of [`UNIT_ROUNDOFF`](crate::lanes::UNIT_ROUNDOFF) of its terms.
+/// A length, in scene units, whose square is as small as f32 holds well: added to what places are off by, it leaves open
+/// what squares that vanish cannot tell.
+const VANISHING: f32 = 1e-18;
+
+/// What products that vanish are off by, some times.
+const VANISHED: f32 = 1e-42;
+
+/// The half-width of a decision's doubt, in units of [`UNIT_ROUNDOFF`] of its terms.
 #[inline(always)]
 fn roundings(n: f32) -> Float8 {
-    float8(n * crate::lanes::UNIT_ROUNDOFF)
+    float8(n * UNIT_ROUNDOFF)
 }

@@ -52,7 +52,7 @@ impl Part for PlanePart {
         (t.is_finite() && ray.accepts(t) && shows(nd, visible)).then_some(t)
     }
 
-    fn refine(&self, ray: &Ray64, _: f64) -> Surface64 {
+    fn refine(&self, ray: &Ray64, _: f64, _: Visible) -> Surface64 {
         flat_surface64(self.point, self.normal, ray)
     }
 
@@ -69,6 +69,10 @@ impl Part for PlanePart {
 
     fn bounds(&self) -> (DVec3, DVec3) {
         (DVec3::NEG_INFINITY, DVec3::INFINITY)
+    }
+
+    fn reach(&self, from: DVec3) -> f64 {
+        (self.point - from).abs().max_element()
     }
 
     fn owner(&self) -> Owner {
@@ -153,5 +157,5 @@ pub(super) fn flat_surface(anchor: Vec3x8, normal: Vec3x8, rays: &RayPacket, t: 
     // The plane through the rounded anchor and the rounded normal, against the exact one at this point.
     let reach = anchor.abs() + point.abs() + point.abs() + (point - anchor).abs();
     let error = roundings(3.0) * normal.abs().dot(reach) + roundings(4.0) * (point - anchor).length();
-    Surface8 { point, normal, error }
+    Surface8::sure(point, normal, error)
 }

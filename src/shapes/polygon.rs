@@ -3,8 +3,8 @@
 use glam::{DVec2, DVec3};
 
 use super::plane::{Crossing, flat_surface, flat_surface64, height_error, shows, side_hidden};
-use super::{Hidden8, Part, Ray64, Surface8, Surface64, roundings};
-use crate::lanes::{Float8, Hit8, Mask8, RayPacket, Vec3x8};
+use super::{Hidden8, Part, Ray64, Surface8, Surface64, VANISHED, roundings};
+use crate::lanes::{Float8, Hit8, Mask8, RayPacket, Vec3x8, float8};
 use crate::plan::{Owner, PolygonPart};
 use crate::scene::Visible;
 
@@ -46,7 +46,7 @@ impl<const N: usize> Part for PolygonPart<N> {
         // Corners round with the scene, a with the subtraction: each moves an edge by two of its roundings, and turns
         // it by as much over the widest way across, of which two edges make one of four corners, four one of eight.
         // Products, sum and direction round six times.
-        let bound = roundings(if N > 4 { 18.0 } else { 12.0 }) * reach * size;
+        let bound = (roundings(if N > 4 { 18.0 } else { 12.0 }) * reach).mul_add(size, float8(VANISHED));
         let first = corners[0] - *origin;
         let error = height_error(*normal, corners[0], first);
         Anchor { height: normal.dot(first), error, normal: *normal, edges, bound }
@@ -70,7 +70,7 @@ impl<const N: usize> Part for PolygonPart<N> {
             least = least.fast_min(flip.select(-e, e));
         }
         let dir = rays.dir.abs().sum();
-        let bound = if CERTIFY { anchor.bound * dir } else { Float8::ZERO };
+        let bound = if CERTIFY { anchor.bound.mul_add(dir, float8(VANISHED)) } else { Float8::ZERO };
         let mut possible = Mask8::ge(least, -bound);
         if !possible.any() {
             return Hit8::none();
@@ -104,7 +104,7 @@ impl<const N: usize> Part for PolygonPart<N> {
         (0..N).all(inside).then_some(t)
     }
 
-    fn refine(&self, ray: &Ray64, _: f64) -> Surface64 {
+    fn refine(&self, ray: &Ray64, _: f64, _: Visible) -> Surface64 {
         flat_surface64(self.corners[0], self.normal, ray)
     }
 

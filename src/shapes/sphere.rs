@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3};
 
-use super::{Hidden8, Part, Ray64, Surface8, Surface64, nearer, roundings};
-use crate::lanes::{Float8, Hit8, Mask8, RayPacket, Vec3x8, difference_of_products};
+use super::{Hidden8, Part, Ray64, Surface8, Surface64, VANISHED, nearer, roundings};
+use crate::lanes::{Float8, Hit8, Mask8, RayPacket, Vec3x8, difference_of_products, float8};
 use crate::plan::{Owner, SpherePart};
 use crate::scene::Visible;
 
@@ -45,7 +45,7 @@ impl Part for SpherePart {
         let (from, to) = (center.abs().sum(), f.abs().sum());
         let reach = from + to;
         let far = roundings(6.0) * reach;
-        let bound = roundings(24.0) * r2 + roundings(4.5) * radius * reach + far * far;
+        let bound = roundings(24.0) * r2 + roundings(4.5) * radius * reach + far.mul_add(far, float8(VANISHED));
         // 13 of it for the closest approach; the nearer root takes as many again from c over z.
         let slip = roundings(26.0).mul_add(to, roundings(8.0) * from);
         Anchor { f, r2, c, near, bound, slip }
@@ -125,9 +125,9 @@ impl Part for SpherePart {
         (disc >= -bound).then(|| ray.first(a.min(b), a.max(b), visible)).flatten()
     }
 
-    fn refine(&self, ray: &Ray64, t: f64) -> Surface64 {
+    fn refine(&self, ray: &Ray64, t: f64, visible: Visible) -> Surface64 {
         let (_, [a, b]) = roots(self, ray);
-        let t = nearer(a, b, t);
+        let t = nearer(a, b, t, visible);
         let normal = (t * ray.dir - (self.center - ray.origin)).normalize();
         Surface64 { t, point: self.center + normal * self.radius, normal }
     }
@@ -147,7 +147,7 @@ impl Part for SpherePart {
         let along = Mask8::lt(by_ray, by_center);
         let point = normal.mul_add(radius, center);
         let point = Vec3x8::select(along, rays.dir.mul_add(t, rays.origin), point);
-        Surface8 { point, normal, error: along.select(by_ray, by_center) }
+        Surface8::sure(point, normal, along.select(by_ray, by_center))
     }
 
     fn uv(&self, point: DVec3) -> DVec2 {

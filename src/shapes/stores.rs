@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::{Part, Ray64, Store, Surface8, Surface64, noise};
-use crate::lanes::{Float8, LANES, Mask8, RayPacket};
+use crate::lanes::{ExactPacket, Float8, LANES, Mask8, RayPacket};
 use crate::plan::{
     BoxPart, ConePart, CylinderPart, DiskPart, Kind, Owner, Parts, PlanePart, PolygonPart, SpherePart, TurnedBoxPart,
 };
@@ -137,9 +137,16 @@ impl Stores {
     }
 
     /// Where eight rays meet the rows that they met, whatever their kinds, and whose those are. Lanes that missed
-    /// mean nothing. With `NORMAL` alone, points and their errors are left out.
+    /// mean nothing. With `NORMAL` alone, points and their errors are left out. Faces that f32 cannot tell apart are
+    /// told by the rays before they were rounded where those are given.
     #[inline(always)]
-    pub fn surface<const NORMAL: bool>(&self, hits: Float8, rays: &RayPacket, t: Float8) -> (Surface8, [Owner; LANES]) {
+    pub fn surface<const NORMAL: bool>(
+        &self,
+        hits: Float8,
+        rays: &RayPacket,
+        t: Float8,
+        exact: Option<&ExactPacket>,
+    ) -> (Surface8, [Owner; LANES]) {
         let hits = hits.to_array().map(RowRef::from_lane);
         let Some((kind, first)) = hits.iter().find_map(|hit| Some((hit.kind()?, hit.row()))) else {
             return (Surface8::NOTHING, [Owner::default(); LANES]);
@@ -155,7 +162,29 @@ impl Stores {
         if (0..LANES).any(|lane| other(&lane)) {
             self.add_other_kinds::<NORMAL>(kind, &hits, (rays, t), &mut surface, &mut owners);
         }
+        if surface.vague.any() && self.certify {
+            self.tell_faces(&hits, (rays, t), exact, &mut surface);
+        }
         (surface, owners)
+    }
+
+    /// Takes from f64 what is vague.
+    #[cold]
+    #[inline(never)]
+    fn tell_faces(
+        &self,
+        hits: &[RowRef; LANES],
+        (rays, t): (&RayPacket, Float8),
+        exact: Option<&ExactPacket>,
+        surface: &mut Surface8,
+    ) {
+        for lane in surface.vague.lanes() {
+            let ray = Ray64::exact(&rays.lane(lane));
+            let ray = exact.map_or(ray, |exact| ray.from(exact, lane));
+            if let Some(found) = self.refine(hits[lane], &ray, f64::from(t.as_array()[lane])) {
+                surface.set(lane, &found);
+            }
+        }
     }
 
     #[inline(never)]
@@ -299,7 +328,8 @@ impl<const NORMAL: bool> Visit for SurfaceOf<'_, NORMAL> {
             true => (P::surface(&store.splat(first), self.rays, self.t), [store.owner(first); LANES]),
             false => (P::surface(&store.gather(&self.rows), self.rays, self.t), self.rows.map(|row| store.owner(row))),
         };
-        let surface = if NORMAL { Surface8 { normal: surface.normal, ..Surface8::NOTHING } } else { surface };
+        let Surface8 { normal, vague, .. } = surface;
+        let surface = if NORMAL { Surface8 { normal, vague, ..Surface8::NOTHING } } else { surface };
         (surface, owners)
     }
 }
@@ -341,7 +371,8 @@ struct Refine<'a> {
 impl Visit for Refine<'_> {
     type Output = Option<Surface64>;
     fn visit<P: Part>(self, store: &Store<P>) -> Self::Output {
-        store.part(self.row).map(|part| part.refine(self.ray, self.t))
+        let visible = store.sides().row(self.row);
+        store.part(self.row).map(|part| part.refine(self.ray, self.t, visible))
     }
 }
 

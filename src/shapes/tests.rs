@@ -271,7 +271,7 @@ fn surfaces_are_where_the_reference_has_them() {
                 assert!(near_tip || turned <= 1e-12 + 20.0 * bound / scale, "{} {fine:?} {turned:e}", context());
 
                 let lanes = Float8::splat(row.to_lane());
-                let (coarse, _) = stores.surface::<false>(lanes, &RayPacket::splat(&ray), Float8::splat(t));
+                let (coarse, _) = stores.surface::<false>(lanes, &RayPacket::splat(&ray), Float8::splat(t), None);
                 let (point, normal) = (wide(coarse.point.lane(3)), wide(coarse.normal.lane(3)));
                 let off = point - want.point;
                 let other_face = normal.dot(want.normal) < 0.9;

@@ -2,8 +2,8 @@
 
 use glam::{DVec2, DVec3};
 
-use super::cuboid::{Stretch, face, face_uv, face64, slabs64};
-use super::{Hidden8, Part, Ray64, Surface8, Surface64, nearer, roundings};
+use super::cuboid::{Face, Stretch, face_uv, face64, slabs64};
+use super::{Hidden8, Part, Ray64, Surface8, Surface64, roundings};
 use crate::lanes::{Float8, Hit8, RayPacket, Vec3x8};
 use crate::plan::{Owner, TurnedBoxPart};
 use crate::scene::Visible;
@@ -41,10 +41,8 @@ impl Part for TurnedBoxPart {
     #[inline(always)]
     fn hit<const CULL: bool, const CERTIFY: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
         let Anchor { min, max, error, axes } = anchor;
-        // Turning rounds each coordinate by a share of the whole direction.
-        let turned = roundings(6.0) * rays.dir.abs().sum();
         let dir = local(axes, rays.dir);
-        Stretch::new::<CERTIFY>(*min, *max, *error, dir, turned).first_of::<CULL, CERTIFY>(hidden, rays)
+        Stretch::new::<CERTIFY>(*min, *max, *error, dir, turning(rays)).first_of::<CULL, CERTIFY>(hidden, rays)
     }
 
     fn decide(&self, ray: &Ray64, visible: Visible) -> Option<f64> {
@@ -53,22 +51,26 @@ impl Part for TurnedBoxPart {
         (entry <= exit).then(|| ray.first(entry, exit, visible)).flatten()
     }
 
-    fn refine(&self, ray: &Ray64, t: f64) -> Surface64 {
+    fn refine(&self, ray: &Ray64, t: f64, visible: Visible) -> Surface64 {
         let (f, dir) = (self.local(self.center - ray.origin), self.local(ray.dir));
-        let (entry, exit) = slabs64(f - self.half, f + self.half, dir);
-        let t = nearer(entry, exit, t);
-        let (point, normal) = face64(-self.half, self.half, t * dir - f);
-        let turn = |v: DVec3| (0..3).map(|k| self.axes[k] * v[k]).sum::<DVec3>();
-        Surface64 { t, point: self.center + turn(point), normal: turn(normal) }
+        let (t, axis, upper) = face64(f - self.half, f + self.half, dir, t, visible);
+        let side = if upper { 1.0 } else { -1.0 };
+        let mut point = t * dir - f;
+        point[axis] = side * self.half[axis];
+        let turned = (0..3).map(|k| self.axes[k] * point[k]).sum::<DVec3>();
+        Surface64 { t, point: self.center + turned, normal: side * self.axes[axis] }
     }
 
     fn surface(rows: &Self::Rows, rays: &RayPacket, t: Float8) -> Surface8 {
+        let Anchor { min, max, error, .. } = Self::anchor(rows, &rays.origin, |_| None);
         let ([center, half], axes) = *rows;
+        let turned = turning(rays);
+        let face = Face::at(t, [min, max, error], local(&axes, rays.dir), turned);
         let from_center = rays.dir.mul_add(t, rays.origin - center);
-        let (point, normal) = face(-half, half, local(&axes, from_center));
+        let (point, normal) = face.put(-half, half, local(&axes, from_center));
         let turn = |v: Vec3x8| axes[0].mul_add(v.x, axes[1].mul_add(v.y, axes[2] * v.z));
         let error = roundings(4.0) * center.abs().sum() + roundings(8.0) * half.sum();
-        Surface8 { point: center + turn(point), normal: turn(normal), error }
+        Surface8 { point: center + turn(point), normal: turn(normal), error, vague: face.vague }
     }
 
     fn uv(&self, point: DVec3) -> DVec2 {
@@ -83,6 +85,12 @@ impl Part for TurnedBoxPart {
     fn owner(&self) -> Owner {
         self.owner
     }
+}
+
+/// Turning rounds each coordinate of a direction by a share of the whole.
+#[inline(always)]
+fn turning(rays: &RayPacket) -> Float8 {
+    roundings(6.0) * rays.dir.abs().sum()
 }
 
 #[inline(always)]
