@@ -31,6 +31,9 @@ pub struct Family {
     make: Maker,
 }
 
+/// Sizes of whole scenes.
+const SCALES: [f64; 12] = [1e-30, 1e-24, 1e-22, 1e-21, 1e-20, 1e-19, 1e-18, 1e-15, 1e-12, 1e9, 1e12, 5e14];
+
 /// Scenes a set.
 const SCENES: usize = 8;
 
@@ -245,11 +248,25 @@ pub fn all() -> Vec<Family> {
             let aim = move |dice: &mut Dice| toward(c + dice.direction() * 4.0, c + axis + dice.in_cube(v));
             (vec![cone(c, axis, [0.7, 0.0], dice.index(2) == 0)], Box::new(aim))
         }),
-        family("scale", vec![1e-30, 1e-24, 1e-18, 1e-12, 1e12, 5e14], |dice, v| {
-            let kind = dice.index(6);
+        family("scale", SCALES.to_vec(), |dice, v| {
+            let kind = dice.index(7);
             let q = dice.turn();
-            let shape = any_shape(kind, DVec3::ZERO, v, q);
-            (vec![shape], Box::new(move |dice| toward(dice.direction() * 4.0 * v, dice.in_cube(0.8 * v))))
+            let shape = match kind {
+                6 => disk(DVec3::ZERO, q * DVec3::Z, v, 0.4 * v),
+                _ => any_shape(kind, DVec3::ZERO, v, q),
+            };
+            let aim = move |dice: &mut Dice| {
+                let ray = toward(dice.direction() * 4.0 * v, dice.in_cube(0.8 * v));
+                // Directions as long as the way, and such of length 1.
+                match dice.index(2) {
+                    0 => ray,
+                    _ => {
+                        let unit = DVec3::from_array(ray.dir.map(f64::from)).normalize();
+                        Ray { dir: unit.as_vec3().to_array(), ..ray }
+                    }
+                }
+            };
+            (vec![shape], Box::new(aim))
         }),
         family("coincident", vec![1.0], |dice, _| {
             let (c, q) = (dice.in_cube(1.0), dice.turn());

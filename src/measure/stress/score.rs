@@ -98,8 +98,7 @@ impl Judge {
     fn measure_normal(&self, ray: &Ray, truth: &Truth, normal: DVec3, unit: f64, tally: &mut Tally) {
         let line = exact(ray);
         tally.length = tally.length.max((normal.length() - 1.0).abs() / U);
-        let sign = normal.dot(truth.normal).signum();
-        let error = (normal.normalize() - sign * truth.normal).length();
+        let error = (normal.normalize() - truth.normal).length();
         let way = line.origin.length() + truth.t.abs() * line.dir.length();
         let allowed = (unit * line.dir.length() + U * way) / truth.bend + 2.0 * U;
         tally.normal = tally.normal.max(if allowed.is_finite() { error / allowed } else { 0.0 });

@@ -18,7 +18,7 @@ pub struct Truth {
     /// Rounded to f64.
     pub t: f64,
     pub primitive: usize,
-    /// Unit, of the surface there, of either sign.
+    /// Unit, of the surface there, outward.
     pub normal: DVec3,
     /// Least radius of curvature, for what an error along the ray does to the normal; infinite for flat surfaces.
     pub bend: f64,
@@ -204,12 +204,13 @@ fn on_box(cuboid: &Cuboid, line: &Line) -> Vec<Place> {
         }
         let (a, b) = ((-&half - &height) / &speed, (&half - &height) / &speed);
         let (near, far) = if a < b { (a, b) } else { (b, a) };
-        let place = |t| Place { t, normal: axes.col(k), bend: f64::INFINITY };
+        let ahead = if speed > big(0.0) { axes.col(k) } else { -axes.col(k) };
+        let place = |t, normal| Place { t, normal, bend: f64::INFINITY };
         if ends[0].as_ref().is_none_or(|end| near > end.t) {
-            ends[0] = Some(place(near));
+            ends[0] = Some(place(near, -ahead));
         }
         if ends[1].as_ref().is_none_or(|end| far < end.t) {
-            ends[1] = Some(place(far));
+            ends[1] = Some(place(far, ahead));
         }
     }
     match ends {
@@ -244,13 +245,14 @@ fn on_cone(cone: &Cone, line: &Line) -> Vec<Place> {
     };
     let mut places: Vec<Place> = roots(&a, &b, &c).into_iter().filter_map(side).collect();
     if cone.caps {
-        for (center, radius) in [(cone.base, cone.radius), (cone.apex, cone.apex_radius)] {
+        let back = minus(&base, &apex);
+        for (center, radius, normal) in [(cone.base, cone.radius, &back), (cone.apex, cone.apex_radius, &axis)] {
             let from = minus(&line.origin, &vector(center));
             let inside = |place: &Place| {
                 let x = along(&from, &place.t, d);
                 dot(&x, &x) <= big(radius) * big(radius)
             };
-            places.extend(flat(center, &axis, line).filter(inside).filter(|_| radius > 0.0));
+            places.extend(flat(center, normal, line).filter(inside).filter(|_| radius > 0.0));
         }
     }
     places
