@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 use super::checkpoint::{Checkpoint, Partial};
 use super::memory::{self, forecast};
-use super::source::Ticket;
+use super::source::{Shared, Ticket};
 use super::write::{Finished, Room, Writer, line};
 use super::{Event, Job, JobError, Report, Shard, Sources, Watch, annotate, existing, ledger};
 use crate::output::exr::Encoded;
@@ -224,12 +224,13 @@ impl Batch<'_> {
         self.watch.event(&Event::FrameStart(index, job));
         self.allow(job)?;
         let loaded = self.sources.load(ticket);
-        let (scene, is_new) = loaded.map_err(|errors| JobError::Scene { path: job.scene.clone(), errors })?;
+        let (shared, is_new) = loaded.map_err(|errors| JobError::Scene { path: job.scene.clone(), errors })?;
         let load_seconds = if is_new { start.elapsed().as_secs_f64() } else { 0.0 };
+        let scene = &shared.scene;
         if is_new {
             scene.warnings.iter().for_each(|warning| self.warn(index, warning.to_string()));
         }
-        let Some((mut rendering, description, annotations)) = self.picture(index, &scene)? else {
+        let Some((mut rendering, description, annotations)) = self.picture(index, &shared)? else {
             self.skip(index);
             return Ok(());
         };
@@ -273,8 +274,8 @@ impl Batch<'_> {
     }
 
     /// Traces a picture with the help of whoever has nothing else to do; `None` where the file is there already.
-    fn picture(&self, index: usize, scene: &Scene) -> Result<Option<Pictured>, JobError> {
-        let job = &self.jobs[index];
+    fn picture(&self, index: usize, shared: &Shared) -> Result<Option<Pictured>, JobError> {
+        let (job, scene) = (&self.jobs[index], &shared.scene);
         let failed = |error| match error {
             RenderError::Cancelled => JobError::Cancelled,
             error => JobError::Render { path: job.scene.clone(), error },
@@ -282,13 +283,13 @@ impl Batch<'_> {
         let next = self.next_frame(index, scene);
         let mut renderer = job.renderer(scene).map_err(failed)?;
         if let Some(next) = &next {
-            renderer = renderer.next_frame(next);
+            renderer = renderer.next_frame(&next.scene);
         }
         let wanted = job.settings.layers.layers(scene).unwrap_or(scene.layers);
         if self.options.annotations {
             renderer = renderer.layers(wanted.with(Aov::Ids));
         }
-        let scene_hash = renderer.scene_hash();
+        let scene_hash = renderer.hash_after(shared.sum());
         if self.options.resume && existing::is_current(job, &renderer, &scene_hash) {
             return Ok(None);
         }
@@ -372,7 +373,7 @@ impl Batch<'_> {
     }
 
     /// The scene that motion leads to, where that is asked for.
-    fn next_frame(&self, index: usize, scene: &Scene) -> Option<Arc<Scene>> {
+    fn next_frame(&self, index: usize, scene: &Scene) -> Option<Arc<Shared>> {
         let job = &self.jobs[index];
         let layers = job.settings.layers.layers(scene).ok()?;
         if !layers.has(Aov::Motion) {

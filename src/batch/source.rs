@@ -2,11 +2,11 @@
 
 use std::collections::{HashMap, VecDeque};
 use std::path::PathBuf;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use super::Job;
 use crate::scene::particles::Look;
-use crate::scene::{Frames, Scene, SceneErrors};
+use crate::scene::{Frames, Scene, SceneErrors, SceneSum};
 
 /// Scenes that are kept after their last job, in case that there will be another one.
 const KEPT: usize = 4;
@@ -17,7 +17,22 @@ const KEPT_PRIMITIVES: usize = 4_000_000;
 #[derive(Default)]
 pub struct Sources {
     files: Mutex<Vec<Arc<Source>>>,
-    kept: Mutex<VecDeque<(Key, Arc<Scene>)>>,
+    kept: Mutex<VecDeque<(Key, Arc<Shared>)>>,
+}
+
+/// A scene, and what all its pictures need of it.
+#[derive(Debug)]
+pub struct Shared {
+    /// The scene.
+    pub scene: Scene,
+    sum: OnceLock<SceneSum>,
+}
+
+impl Shared {
+    /// It as a hash, made once.
+    pub fn sum(&self) -> &SceneSum {
+        self.sum.get_or_init(|| self.scene.sum())
+    }
 }
 
 /// A scene file, the size of its picture, the frame, and whether its background is transparent.
@@ -74,7 +89,7 @@ impl Sources {
     ///
     /// # Errors
     /// What is wrong with the scene.
-    pub fn load(&self, ticket: Ticket) -> Result<(Arc<Scene>, bool), SceneErrors> {
+    pub fn load(&self, ticket: Ticket) -> Result<(Arc<Shared>, bool), SceneErrors> {
         let (source, key) = (&ticket.source, &ticket.key);
         let mut turns = lock(&source.turns);
         while turns.served < ticket.turn {
@@ -88,7 +103,7 @@ impl Sources {
         drop(turns);
         let scene = frames.scene(key.2).map(|mut scene| {
             scene.background.transparent |= key.3;
-            Arc::new(scene)
+            Arc::new(Shared { scene, sum: OnceLock::new() })
         });
         lock(&source.turns).frames = Some(frames);
         let scene = scene?;
@@ -96,7 +111,7 @@ impl Sources {
         Ok((scene, true))
     }
 
-    fn kept(&self, key: &Key) -> Option<Arc<Scene>> {
+    fn kept(&self, key: &Key) -> Option<Arc<Shared>> {
         let mut kept = lock(&self.kept);
         let at = kept.iter().position(|(known, _)| known == key)?;
         let found = kept.remove(at)?;
@@ -105,12 +120,12 @@ impl Sources {
         Some(scene)
     }
 
-    fn keep(&self, key: Key, scene: &Arc<Scene>) {
+    fn keep(&self, key: Key, scene: &Arc<Shared>) {
         let mut kept = lock(&self.kept);
         kept.push_front((key, Arc::clone(scene)));
         let mut primitives = 0;
-        let mut fits = |(place, (_, scene)): (usize, &(Key, Arc<Scene>))| {
-            primitives += scene.primitive_count();
+        let mut fits = |(place, (_, shared)): (usize, &(Key, Arc<Shared>))| {
+            primitives += shared.scene.primitive_count();
             place == 0 || (place < KEPT && primitives <= KEPT_PRIMITIVES)
         };
         let count = kept.iter().enumerate().take_while(|entry| fits(*entry)).count();

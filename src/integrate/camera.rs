@@ -11,9 +11,9 @@ use crate::scene::{Camera, Filter, FilterTable, Lens};
 /// One camera over one display window.
 #[derive(Debug)]
 pub struct CameraRays {
-    filter: FilterTable,
+    /// `None`: samples sit at the centres of pixels.
+    filter: Option<FilterTable>,
     seed: u64,
-    centered: bool,
     /// Direction, and its change a pixel right and down.
     dir: [DVec3; 3],
     /// Origin, relative to the plan's, and its change.
@@ -60,7 +60,8 @@ impl CameraRays {
         };
         let shared = origin[1] == DVec3::ZERO && !matches!(optics, Optics::Lens(..));
         let common = shared.then(|| origin[0].as_vec3().to_array());
-        CameraRays { filter: FilterTable::new(filter), seed, centered: spp == 1, dir, origin, optics, common }
+        let filter = (spp > 1).then(|| FilterTable::new(filter));
+        CameraRays { filter, seed, dir, origin, optics, common }
     }
 
     /// The origin, where all rays share it.
@@ -107,11 +108,9 @@ impl CameraRays {
             x[lane] = f64::from(samples.x[lane]) + 0.5;
             y[lane] = f64::from(samples.y[lane]) + 0.5;
         }
-        if self.centered {
-            return [x, y];
-        }
+        let Some(filter) = &self.filter else { return [x, y] };
         let [u, v] = samples.pattern.sample(&samples.index);
-        let off = [self.filter.offsets(&u), self.filter.offsets(&v)];
+        let off = [filter.offsets(&u), filter.offsets(&v)];
         for lane in 0..LANES {
             x[lane] += off[0][lane];
             y[lane] += off[1][lane];

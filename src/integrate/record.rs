@@ -97,6 +97,10 @@ pub trait Record {
 
     /// Whether what camera rays see is to be told, and what came of each tile.
     const SURFACES: bool = false;
+    /// Whether samples may be left out that are known to meet nothing.
+    fn passes_blanks(&self) -> bool {
+        !Self::ON && !Self::SURFACES
+    }
     /// Camera rays of one packet met surfaces.
     fn surface(&mut self, _: &Seen) {}
     /// The camera rays of a tile met all that they meet.

@@ -96,7 +96,8 @@ impl Block {
     ) -> Option<BlockWork> {
         let (window, View { rays, coverage }) = (self.window, *view);
         let sums = vec![[0f64; 4]; window.area()];
-        let blank = if R::ON || R::SURFACES { None } else { direct.blank().filter(|_| coverage.is_some()) };
+        let may_pass = coverage.is_some() && record.passes_blanks();
+        let blank = if may_pass { direct.blank() } else { None };
         let before = (Counts::default(), RayCounts::default());
         let room = Room::default();
         let mut work = Work { rays, direct, record, sums, room, before, tiles: 0, background_tiles: 0 };

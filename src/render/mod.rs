@@ -33,7 +33,7 @@ use crate::integrate::{CameraRays, Direct, Lamps, RayCounts, Record};
 use crate::output::{self, Description, Losses, Options, OutputError};
 use crate::plan::{InvalidScene, Plan, Sight, Skip, SkipSet, validate};
 use crate::sample;
-use crate::scene::{Aov, Camera, ImageSettings, Integrator, Layers, RenderSettings, Scene};
+use crate::scene::{Aov, Camera, ImageSettings, Integrator, Layers, RenderSettings, Scene, SceneSum};
 
 /// Which tracer finds the hits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -322,8 +322,13 @@ impl<'s> Renderer<'s> {
 
     /// A hash of the scene and of all settings that decide about colour: equal hashes, equal pixels. In hexadecimal.
     pub fn scene_hash(&self) -> String {
+        self.hash_after(&self.scene.sum())
+    }
+
+    /// The same where the scene was hashed before.
+    pub fn hash_after(&self, scene: &SceneSum) -> String {
         let settings = (self.image(), self.view(), self.settings(), self.engine == Engine::Reference);
-        self.scene.hash(&format!("{settings:?}"))
+        scene.hash(&format!("{settings:?}"))
     }
 
     /// What this render does and what it leaves out.
@@ -416,7 +421,7 @@ pub struct Frame<'s> {
     coverage: Option<Coverage>,
     rays: CameraRays,
     /// Those of the other half of the samples, to a noise level.
-    other_rays: CameraRays,
+    other_rays: Option<CameraRays>,
     noise: Option<Noise>,
     spp: u32,
     settings: RenderSettings,
@@ -447,7 +452,8 @@ impl<'s> Frame<'s> {
         // A single sample would sit at the centre.
         let spp = if noise.is_some() { image.spp.max(2) } else { image.spp };
         let rays = |seed| CameraRays::new(camera, plan.origin, display, image.filter, spp, seed);
-        let (rays, other_rays) = (rays(seed), rays(sample::other_seed(seed)));
+        let other_rays = noise.map(|_| rays(sample::other_seed(seed)));
+        let rays = rays(seed);
         let (settings, axis) = (renderer.settings.clone(), camera.view_axis());
         Frame {
             plan,
@@ -492,7 +498,7 @@ impl<'s> Frame<'s> {
 
     /// Of each half of the samples, to a noise level.
     fn views(&self) -> [View<'_>; 2] {
-        [self.view(), View { rays: &self.other_rays, ..self.view() }]
+        [self.view(), View { rays: self.other_rays.as_ref().unwrap_or(&self.rays), ..self.view() }]
     }
 
     fn direct(&self) -> Direct<'_> {

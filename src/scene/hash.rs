@@ -19,13 +19,31 @@ impl Scene {
     /// The hash of the scene at its frame and of `settings`, in 64 hexadecimal digits. `settings` are any words that say
     /// what else decides about the pixels.
     pub fn hash(&self, settings: &str) -> String {
-        let mut sum = Sum(Sha256::new(), Vec::with_capacity(2 * PART));
+        self.sum().hash(settings)
+    }
+
+    /// All of the hash but for the settings.
+    pub fn sum(&self) -> SceneSum {
+        let mut sum = Sum(Sha256::new(), Vec::new());
         sum.scene(self);
+        SceneSum(sum)
+    }
+}
+
+/// A scene that was hashed, for the hashes of pictures with different settings.
+#[derive(Debug)]
+pub struct SceneSum(Sum);
+
+impl SceneSum {
+    /// [`Scene::hash`].
+    pub fn hash(&self, settings: &str) -> String {
+        let mut sum = self.0.clone();
         sum.small(&settings);
         sum.finish()
     }
 }
 
+#[derive(Debug, Clone)]
 struct Sum(Sha256, Vec<u8>);
 
 /// Text goes in as its bytes.

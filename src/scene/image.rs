@@ -116,10 +116,12 @@ impl FilterTable {
     pub fn new(filter: Filter) -> Self {
         let points = 16 * Self::STEPS;
         let place = |k: usize| 2.0 * k as f64 / points as f64 - 1.0;
-        let mut sums = vec![0.0];
+        let mut sums = Vec::with_capacity(points + 1);
+        sums.push(0.0);
+        let mut weight = filter.kind.weight(place(0));
         for k in 0..points {
-            let area = filter.kind.weight(place(k)) + filter.kind.weight(place(k + 1));
-            sums.push(sums[k] + area);
+            let before = std::mem::replace(&mut weight, filter.kind.weight(place(k + 1)));
+            sums.push(sums[k] + (before + weight));
         }
         let mut k = 0;
         let offsets = (0..=Self::STEPS).map(|step| {

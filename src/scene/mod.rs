@@ -46,6 +46,7 @@ pub use self::cloud::{Cloud, CloudMaterial, CloudShapes, Rows};
 pub use self::error::{Place, SceneError, SceneErrors, Warning};
 pub(crate) use self::fit::bound as bounding_balls;
 pub use self::frames::Frames;
+pub use self::hash::SceneSum;
 pub use self::image::{Filter, FilterKind, FilterTable, ImageSettings, Integrator, RenderSettings};
 pub use self::layers::{Aov, Layers, UnknownAov};
 pub use self::light::{Emitter, Falloff, Light, Patches, Source, frame};

@@ -1,8 +1,8 @@
 //! Chunks packed by zlib, as ZIPS and ZIP have them.
 //!
-//! The crate can do it too, at zlib's level 4 with a state of its own for each chunk. Level 1 with one state a thread
-//! takes a third of the time for files that are 7 % longer (1920x1080, 7 channels of halves and 9 of floats:
-//! 0.37 instead of 1.21 s of one core).
+//! The crate can do it too, at zlib's level 4 with a state of its own for each chunk. Level 1 of zlib-rs with one state
+//! a thread takes a third of the time of level 4 for files that are 5 % longer, and two fifths of that of miniz_oxide at
+//! level 1 for files that are 2 % shorter (128x128, lines of 3.3 KB: 1.9, 6.0 and 4.9 ms a picture).
 //! Source: OpenEXR, `internal_zip.c`: bytes at even places, then those at odd ones; each as its difference from the one
 //! before it, plus 128; then zlib; and as they were where that is no shorter.
 

@@ -171,7 +171,10 @@ impl<'s> LayerPlan<'s> {
     pub fn names(&self, picture: &Picture) -> IdNames {
         let numbers = |name: &str| -> BTreeSet<u32> {
             match picture.channel(name).map(|channel| &channel.samples) {
-                Some(Samples::Uint(ids)) => ids.iter().copied().filter(|id| *id > 0).collect(),
+                // Neighbours mostly see the same.
+                Some(Samples::Uint(ids)) => {
+                    ids.chunk_by(|a, b| a == b).map(|same| same[0]).filter(|id| *id > 0).collect()
+                }
                 _ => BTreeSet::new(),
             }
         };

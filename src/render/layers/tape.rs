@@ -142,6 +142,11 @@ impl Record for LayerTape<'_, '_> {
 
     const SURFACES: bool = true;
 
+    fn passes_blanks(&self) -> bool {
+        // In all others a miss is what was there before.
+        !self.plan.layers.has_any(&[Aov::Cost, Aov::Variance])
+    }
+
     fn surface(&mut self, seen: &Seen) {
         let (p, tile) = (seen.packet, &mut self.tile);
         let dir = seen.rays.dir;
