@@ -19,6 +19,8 @@ pub mod dimension {
     pub const SCATTER: u32 = 0;
     /// First which way a path goes on, then whether it does.
     pub const CHOICE: u32 = 1;
+    /// The direction in which a surface looks for ambient light.
+    pub const OPENNESS: u32 = 2;
     /// The place in light `i`: `LIGHTS + i`; the sky comes after the last light.
     pub const LIGHTS: u32 = 16;
 

@@ -196,6 +196,23 @@ fn a_wall_closes_half_of_the_sky() {
     }
 }
 
+/// Ambient light comes from the open half alone, and adds to lights whose shadows have nothing to do with it.
+#[test]
+fn a_wall_hides_half_of_the_ambient_light() {
+    let mut scene = floor(vec![], 1e-6, 16, 64);
+    scene.objects.push(object(plane(DVec3::new(1.0, 0.0, 0.0), DVec3::NEG_X), 0));
+    scene.ambient = DVec3::splat(0.4);
+    for (engine, integrator) in ENGINES.into_iter().flat_map(|e| [(e, Integrator::Direct), (e, Integrator::Path)]) {
+        (scene.render.integrator, scene.render.max_depth) = (integrator, 1);
+        (scene.render.ambient_occlusion, scene.render.ao_distance) = (false, f64::INFINITY);
+        close(mean(&reds(&by(engine, &scene))), 0.4, 1e-6, (engine, integrator));
+        scene.render.ambient_occlusion = true;
+        close(mean(&reds(&by(engine, &scene))), 0.2, 2e-3, (engine, integrator));
+        scene.render.ao_distance = 0.99;
+        close(mean(&reds(&by(engine, &scene))), 0.4, 1e-6, (engine, integrator));
+    }
+}
+
 /// Ambient occlusion is a path of two rays under a white sky.
 #[test]
 fn openness_is_what_a_white_sky_gives() {

@@ -92,6 +92,9 @@ fn lit_by_areas(dice: &mut Dice, mut scene: Scene) -> Scene {
     let color = Paint::Color(DVec3::new(0.9, 0.8, 0.7));
     scene.materials.push(material("mirror", Model::Mirror { reflectance: color }));
     scene.materials.push(material("glass", Model::Dielectric { ior: 1.5, tint: Paint::Color(DVec3::ONE) }));
+    if dice.index(4) == 0 {
+        (scene.ambient, scene.render.ambient_occlusion) = (DVec3::new(0.2, 0.3, 0.4), dice.index(3) > 0);
+    }
     if dice.index(2) == 0 {
         scene.objects.iter_mut().for_each(|object| object.material = dice.index(3));
     }

@@ -213,13 +213,16 @@ fn image(image: &scene::ImageSettings) -> Value {
 }
 
 fn render(scene: &Scene) -> Value {
-    let scene::RenderSettings { integrator, max_depth, seed, noise, ao_distance } = scene.render;
+    let scene::RenderSettings { integrator, max_depth, seed, noise, ao_distance, ambient_occlusion } = scene.render;
     let integrator = match integrator {
         Integrator::Direct => "direct",
         Integrator::Ao => "ao",
         Integrator::Path => "path",
     };
-    json!({ "integrator": integrator, "max_depth": max_depth, "seed": seed, "noise": noise, "ao_distance": ao_distance })
+    json!({
+        "integrator": integrator, "max_depth": max_depth, "seed": seed, "noise": noise, "ao_distance": ao_distance,
+        "ambient_occlusion": ambient_occlusion,
+    })
 }
 
 /// Names a page lists of each kind of thing, at most.

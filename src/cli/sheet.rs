@@ -9,8 +9,10 @@ use octray::output::{self, Description, Format, Options};
 use super::exit::{Exit, Failure};
 use super::{Run, pictures};
 
-/// Pixels along a side of a cell.
-const CELL: usize = 160;
+/// Width of the sheet in pixels, as far as cells allow.
+const WIDTH: usize = 1280;
+/// Least and most pixels along a side of a cell.
+const SIDES: [usize; 2] = [160, 320];
 /// Most pictures; of more, every so many are shown.
 const MOST: usize = 400;
 /// Digits, three columns by five rows, from the upper left on.
@@ -34,23 +36,33 @@ pub fn write(jobs: &[Job], path: &Path, run: &Run) -> Result<(), Failure> {
     let step = jobs.len().div_ceil(MOST).max(1);
     let shown: Vec<(usize, &Job)> = jobs.iter().enumerate().step_by(step).collect();
     let columns = (shown.len() as f64).sqrt().ceil().max(1.0) as usize;
-    let (width, height) = (columns * CELL, shown.len().div_ceil(columns) * (CELL + LABEL));
+    let cell = cell(&shown, columns);
+    let (width, height) = (columns * cell.0, shown.len().div_ceil(columns) * (cell.1 + LABEL));
     let size = |side: usize| u32::try_from(side).unwrap_or(u32::MAX);
     let display = (size(width), size(height));
     let mut sheet = Picture::new(display, Window::full(display));
     sheet.pixels.fill([0.02, 0.02, 0.02, 1.0]);
     for (place, (index, job)) in shown.into_iter().enumerate() {
-        let corner = (place % columns * CELL, place / columns * (CELL + LABEL));
+        let corner = (place % columns * cell.0, place / columns * (cell.1 + LABEL));
         match output::read(&job.output) {
-            Ok(picture) => draw(&picture, &mut sheet, corner),
-            Err(_) => cross(&mut sheet, corner),
+            Ok(picture) => draw(&picture, &mut sheet, corner, cell),
+            Err(_) => cross(&mut sheet, corner, cell),
         }
-        label(index + 1, &mut sheet, (corner.0 + 4, corner.1 + CELL + 2));
+        label(index + 1, &mut sheet, (corner.0 + 4, corner.1 + cell.1 + 2));
     }
     let described = Description { scene: Some("contact sheet".into()), ..Description::default() };
     let encoded = output::encode(Format::Png, &sheet, Options::default(), &described);
     let encoded = encoded.map_err(|error| Failure::new(Exit::Output, error).of(path))?;
     pictures::write_bytes(path, &encoded.bytes, run)
+}
+
+/// Width and height of a cell: as the first picture that is there.
+fn cell(shown: &[(usize, &Job)], columns: usize) -> (usize, usize) {
+    let width = (WIDTH / columns).clamp(SIDES[0], SIDES[1]);
+    let first = shown.iter().find_map(|(_, job)| output::read(&job.output).ok());
+    let (x, y) = first.map_or((1, 1), |picture| picture.display);
+    let height = (width as f64 * f64::from(y) / f64::from(x)) as usize;
+    (width, height.clamp(width / 4, 2 * width))
 }
 
 fn set(sheet: &mut Picture, x: usize, y: usize, color: [f32; 3]) {
@@ -60,10 +72,10 @@ fn set(sheet: &mut Picture, x: usize, y: usize, color: [f32; 3]) {
 }
 
 /// A picture fitted into a cell: means of the pixels that fall together, over the sheet.
-fn draw(picture: &Picture, sheet: &mut Picture, corner: (usize, usize)) {
+fn draw(picture: &Picture, sheet: &mut Picture, corner: (usize, usize), cell: (usize, usize)) {
     let (width, height) = (picture.display.0 as usize, picture.display.1 as usize);
-    let room = CELL - 4;
-    let scale = (room as f64 / width.max(height) as f64).min(1.0);
+    let fits = |room: usize, side: usize| (room - 4) as f64 / side as f64;
+    let scale = fits(cell.0, width).min(fits(cell.1, height)).min(1.0);
     let fitted = |side: usize| ((side as f64 * scale) as usize).max(1);
     let (w, h) = (fitted(width), fitted(height));
     for y in 0..h {
@@ -79,18 +91,19 @@ fn draw(picture: &Picture, sheet: &mut Picture, corner: (usize, usize)) {
             }
             if count > 0.0 {
                 let over = |k: usize| (sum[k] + (count - sum[3]).max(0.0) * 0.02) / count;
-                let place = (corner.0 + (CELL - w) / 2 + x, corner.1 + (CELL - h) / 2 + y);
+                let place = (corner.0 + (cell.0 - w) / 2 + x, corner.1 + (cell.1 - h) / 2 + y);
                 set(sheet, place.0, place.1, [over(0), over(1), over(2)]);
             }
         }
     }
 }
 
-fn cross(sheet: &mut Picture, corner: (usize, usize)) {
-    for k in 20..CELL - 20 {
+fn cross(sheet: &mut Picture, corner: (usize, usize), cell: (usize, usize)) {
+    for k in cell.0 / 8..cell.0 - cell.0 / 8 {
+        let y = corner.1 + k * cell.1 / cell.0;
         for thick in 0..3 {
-            set(sheet, corner.0 + k + thick, corner.1 + k, [0.6, 0.05, 0.05]);
-            set(sheet, corner.0 + CELL - k + thick, corner.1 + k, [0.6, 0.05, 0.05]);
+            set(sheet, corner.0 + k + thick, y, [0.6, 0.05, 0.05]);
+            set(sheet, corner.0 + cell.0 - k + thick, y, [0.6, 0.05, 0.05]);
         }
     }
 }

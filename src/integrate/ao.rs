@@ -1,4 +1,4 @@
-//! Ambient occlusion: how open each place is.
+//! Ambient occlusion: how open each place is, as all there is to see or as a factor on ambient light.
 
 use super::direct::{Direct, Sink};
 use super::lamps::pairs;
@@ -13,6 +13,26 @@ use crate::shade::scattered;
 impl Direct<'_> {
     /// Adds the albedo where a scattered ray meets nothing near. As a light it has the number of the sky.
     pub(super) fn add_openness<R: Record>(&self, wave: &Wave, hits: Hits, sink: &mut Sink<R>) {
+        let number = self.plan.scene.lights.len();
+        self.add_open(wave, hits, sink, (number, dimension::SCATTER), Vec3x8::splat([1.0; 3]));
+    }
+
+    /// Adds ambient light where it is not hidden. As a light it has the number after that of the sky.
+    pub(super) fn add_open_ambient<R: Record>(&self, wave: &Wave, hits: Hits, sink: &mut Sink<R>) {
+        if let Some(ambient) = self.ambient.filter(|_| self.settings.ambient_occlusion) {
+            let number = self.plan.scene.lights.len() + 1;
+            self.add_open(wave, hits, sink, (number, dimension::OPENNESS), ambient);
+        }
+    }
+
+    fn add_open<R: Record>(
+        &self,
+        wave: &Wave,
+        hits: Hits,
+        sink: &mut Sink<R>,
+        (number, dimension): (usize, u32),
+        light: Vec3x8,
+    ) {
         let t_max = float8(self.settings.ao_distance as f32);
         let mut lit = [0; PACKETS];
         let mut radiance = [Vec3x8::ZERO; PACKETS];
@@ -20,17 +40,18 @@ impl Direct<'_> {
         sink.shadows.packets.fill(RayPacket::dead());
         for p in bits(hits.1) {
             let shaded = &hits.0[p];
-            let dir = scattered(shaded.n_s, pairs(wave, p, dimension::SCATTER, sink.seeds));
+            let dir = scattered(shaded.n_s, pairs(wave, p, dimension, sink.seeds));
             let zero = Float8::ZERO;
             let above = Mask8::gt(shaded.n_s.dot(dir), zero) & Mask8::gt(shaded.n_g.dot(dir), zero);
             let facing = above & Mask8::gt(shaded.bsdf.lit, zero);
             let albedo = shaded.bsdf.color * (shaded.bsdf.diffuse * shaded.softened(dir));
-            (radiance[p], lit[p]) = (wave.weighted(p, albedo), facing.bits() & shaded.hit);
+            let share = wave.weighted(p, albedo.scale(light));
+            (radiance[p], lit[p]) = (share, facing.bits() & shaded.hit);
             let (origin, live) = (shaded.leave(true, shaded.error), Mask8::from_bits(lit[p]));
             sink.shadows.packets[p] = RayPacket::new(origin, dir, t_max, live);
         }
         let cast = lit;
-        self.settle(self.plan.scene.lights.len(), wave, hits.1, (&cast, &mut lit), sink);
+        self.settle(number, wave, hits.1, (&cast, &mut lit), sink);
         sink.add(hits.1, &radiance, &lit);
     }
 }

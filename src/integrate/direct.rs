@@ -25,7 +25,7 @@ pub struct Direct<'s> {
     pub(super) materials: MaterialTable,
     pub(super) lights: LightTable,
     backdrop: Backdrop8<'s>,
-    ambient: Option<Vec3x8>,
+    pub(super) ambient: Option<Vec3x8>,
     pub(super) lamps: &'s Lamps<'s>,
     pub(super) settings: RenderSettings,
     /// Some light has primitives that nothing can put in its shadow.
@@ -137,7 +137,8 @@ impl<'s> Direct<'s> {
 
     /// Whether samples draw numbers for light.
     pub fn draws(&self) -> bool {
-        self.settings.integrator != Integrator::Direct || self.lamps.draws()
+        let looks_around = self.settings.ambient_occlusion && self.ambient.is_some();
+        self.settings.integrator != Integrator::Direct || looks_around || self.lamps.draws()
     }
 
     #[inline(always)]
@@ -248,6 +249,7 @@ impl<'s> Direct<'s> {
                     self.add_light(light, wave, (shaded, seen), sink);
                 }
                 self.add_lamps(wave, (shaded, seen), sink);
+                self.add_open_ambient(wave, (shaded, seen), sink);
             }
         }
         if wave.depth < self.settings.max_depth && self.goes_on() {
@@ -289,7 +291,8 @@ impl<'s> Direct<'s> {
 
     #[inline(always)]
     fn add_ambient(&self, wave: &Wave, shaded: &Shaded, radiance: &mut Vec3x8) {
-        if let Some(ambient) = self.ambient.filter(|_| self.settings.integrator != Integrator::Ao) {
+        let is_open = self.settings.integrator != Integrator::Ao && !self.settings.ambient_occlusion;
+        if let Some(ambient) = self.ambient.filter(|_| is_open) {
             let albedo = shaded.bsdf.color * shaded.bsdf.diffuse;
             let seen = wave.weighted(shaded.packet, albedo.scale(ambient));
             *radiance = Vec3x8::select(Mask8::from_bits(shaded.hit), *radiance + seen, *radiance);

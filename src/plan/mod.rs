@@ -123,7 +123,7 @@ impl<'s> Plan<'s> {
         let bounded = is_straight && !self.scene.objects.iter().any(is_plane);
         let why = || "outside of what the boxes around all primitives cover there is nothing else".to_owned();
         self.skips.decide(Skip::Background, 0, bounded.then(why));
-        if sight.integrator == Integrator::Path {
+        if sight.settings.integrator == Integrator::Path {
             self.skips.decide(Skip::Bounces, 0, None);
         }
         if !self.scatters {

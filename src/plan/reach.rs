@@ -4,7 +4,7 @@
 use glam::DVec3;
 
 use super::skips::{Skip, Skips};
-use crate::scene::{Backdrop, Camera, Emitter, Integrator, Lens, Light, Scene, Shape, Source};
+use crate::scene::{Backdrop, Camera, Emitter, Integrator, Lens, Light, RenderSettings, Scene, Shape, Source};
 
 /// Most primitives of which every pair is looked at.
 const MOST_PAIRS: usize = 256;
@@ -176,7 +176,7 @@ pub struct Sight<'a> {
     /// How far rays are from the centres of their pixels, at most, in pixels.
     pub reach: f64,
     /// What is made of what it sees.
-    pub integrator: Integrator,
+    pub settings: &'a RenderSettings,
 }
 
 /// The sides of what a camera sees: points with `normal . (point - eye) <= 0` for all of them.
@@ -269,15 +269,16 @@ fn distance_to_triangle(point: DVec3, a: DVec3, b: DVec3, c: DVec3) -> f64 {
 }
 
 /// Whether a surface gets light from nowhere but the scene's lights.
-fn has_direct_light_only(scene: &Scene, integrator: Integrator) -> bool {
+fn has_direct_light_only(scene: &Scene, settings: &RenderSettings) -> bool {
+    let looks_around = settings.ambient_occlusion && scene.ambient != DVec3::ZERO;
     let sky = scene.background.light && matches!(scene.background.backdrop, Backdrop::Image { .. });
-    integrator == Integrator::Direct && !sky
+    settings.integrator == Integrator::Direct && !sky && !looks_around
 }
 
 /// By primitive: whether it can be seen, or throw a shadow on what is. `None` where that leaves out less than a
 /// quarter, by a sample of them, or cannot be told.
 pub fn needed(scene: &Scene, lights: &[bool], sight: &Sight, skips: &mut Skips) -> Option<Vec<bool>> {
-    let is_asked = skips.allows(Skip::Objects) && has_direct_light_only(scene, sight.integrator);
+    let is_asked = skips.allows(Skip::Objects) && has_direct_light_only(scene, sight.settings);
     let frustum = Frustum::new(sight).filter(|_| is_asked)?;
     let count = scene.primitive_count();
     let step = (count / 1000).max(1);

@@ -102,7 +102,7 @@ pub enum EventKind {
     Refraction,
     /// A scattered ray.
     Bounce,
-    /// A light, by its index, at a surface that scatters light; the sky comes after the last.
+    /// A light, by its index, at a surface that scatters light; the sky comes after the last, then ambient light.
     Light(u32),
     /// A texture, by its index, of the surface that the ray met. The cell is 0 or 1 in a checker, the
     /// number of the (upper left) texel in a picture, row by row.
@@ -246,10 +246,11 @@ impl Walk<'_> {
         match material.model {
             Model::Mirror { .. } | Model::Dielectric { .. } => DVec3::ZERO,
             Model::Diffuse { .. } | Model::Phong { .. } if self.settings.integrator == Integrator::Ao => {
-                self.openness(step, hit, &side) * albedo(&material.model, color)
+                let number = self.tracer.lights.len();
+                self.openness(step, hit, &side, (number, dimension::SCATTER)) * albedo(&material.model, color)
             }
             Model::Diffuse { .. } | Model::Phong { .. } => {
-                let ambient = self.tracer.ambient * albedo(&material.model, color);
+                let ambient = self.ambient(step, hit, &side) * albedo(&material.model, color);
                 ambient + self.lights(step, hit, &side, &material.model, color)
             }
         }
@@ -276,15 +277,24 @@ impl Walk<'_> {
         sum
     }
 
+    /// Ambient light at a place. As a light it has the number after that of the sky.
+    fn ambient(&mut self, step: &Step, hit: &Hit, side: &Side) -> DVec3 {
+        let (ambient, number) = (self.tracer.ambient, self.tracer.lights.len() + 1);
+        if ambient == DVec3::ZERO || !self.settings.ambient_occlusion {
+            return ambient;
+        }
+        ambient * self.openness(step, hit, side, (number, dimension::OPENNESS))
+    }
+
     /// 1 where a scattered ray meets nothing near, else 0.
-    fn openness(&mut self, step: &Step, hit: &Hit, side: &Side) -> f64 {
-        let dir = scattered(side.n, self.pair(step.depth, dimension::SCATTER));
+    fn openness(&mut self, step: &Step, hit: &Hit, side: &Side, (number, dimension): (usize, u32)) -> f64 {
+        let dir = scattered(side.n, self.pair(step.depth, dimension));
         let t_max = self.settings.ao_distance;
         let open = side.faces(dir) && {
             self.pixel.rays.shadow += 1;
             !self.tracer.occluded(&Ray { origin: hit.spawn(dir), dir, t_min: 0.0, t_max })
         };
-        self.event(step, EventKind::Light(self.tracer.lights.len() as u32), i64::from(open));
+        self.event(step, EventKind::Light(number as u32), i64::from(open));
         if open { side.terminator(dir) } else { 0.0 }
     }
 

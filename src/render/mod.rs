@@ -342,8 +342,8 @@ impl<'s> Renderer<'s> {
         // Whole squares are sampled to a noise level, and for costs.
         let is_whole = self.settings.noise.is_some() || self.layers.has(Aov::Cost);
         let Window { x0, y0, x1, y1 } = if is_whole { Block::hull(window) } else { window };
-        let (window, integrator) = ([x0, y0, x1, y1], self.settings.integrator);
-        plan.look(&Sight { camera: self.camera, display, window, reach: self.reach(), integrator });
+        let window = [x0, y0, x1, y1];
+        plan.look(&Sight { camera: self.camera, display, window, reach: self.reach(), settings: &self.settings });
         plan
     }
 

@@ -25,19 +25,35 @@ pub fn direction(up: DVec3) -> DVec3 {
     (front + 0.3 * up.cross(front) + 0.25 * up).normalize()
 }
 
-/// The view of everything but planes, as near as the lens and the shape of the picture (`aspect`: width over height)
-/// allow; `around`: from a distance that is right for all directions.
-pub fn view(scene: &Scene, camera: &Camera, aspect: f64, around: bool) -> View {
+/// A ball around everything but planes: centre and radius.
+pub fn ball(scene: &Scene) -> (DVec3, f64) {
+    let balls = balls(scene);
+    if balls.is_empty() { (DVec3::ZERO, 1.0) } else { around_all(&balls) }
+}
+
+fn balls(scene: &Scene) -> Vec<(DVec3, f64)> {
     let mut balls = Vec::new();
     scene.primitives().for_each(|primitive| bound(&primitive.shape, &mut balls));
-    let direction = direction(camera.up);
-    if balls.is_empty() {
-        return View { eye: direction, target: DVec3::ZERO };
-    }
+    balls
+}
+
+fn around_all(balls: &[(DVec3, f64)]) -> (DVec3, f64) {
     let low = balls.iter().fold(DVec3::INFINITY, |low, (center, radius)| low.min(center - *radius));
     let high = balls.iter().fold(DVec3::NEG_INFINITY, |high, (center, radius)| high.max(center + *radius));
     let center = 0.5 * (low + high);
     let radius = balls.iter().map(|(ball, radius)| (ball - center).length() + radius).fold(0.0, f64::max);
+    (center, radius)
+}
+
+/// The view of everything but planes, as near as the lens and the shape of the picture (`aspect`: width over height)
+/// allow; `around`: from a distance that is right for all directions.
+pub fn view(scene: &Scene, camera: &Camera, aspect: f64, around: bool) -> View {
+    let balls = balls(scene);
+    let direction = direction(camera.up);
+    if balls.is_empty() {
+        return View { eye: direction, target: DVec3::ZERO };
+    }
+    let (center, radius) = around_all(&balls);
     let vfov = match camera.lens {
         Lens::Pinhole { vfov } | Lens::ThinLens { vfov, .. } => vfov,
         Lens::Orthographic { .. } | Lens::Panoramic => {

@@ -27,6 +27,8 @@ pub struct RenderSettings {
     pub noise: Option<f64>,
     /// How far occluders count in ambient occlusion, scene units, > 0; may be infinite.
     pub ao_distance: f64,
+    /// Whether ambient light reaches a place only from where nothing is nearer than that, but for `Ao`, which has none.
+    pub ambient_occlusion: bool,
 }
 
 impl Default for RenderSettings {
@@ -37,6 +39,7 @@ impl Default for RenderSettings {
             seed: 0,
             noise: None,
             ao_distance: f64::INFINITY,
+            ambient_occlusion: false,
         }
     }
 }

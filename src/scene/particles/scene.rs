@@ -8,12 +8,12 @@ use glam::DVec3;
 use super::{Drawn, Format, Look, Trajectory};
 use crate::scene::frames::{Draft, OpenCamera, Store};
 use crate::scene::{
-    Backdrop, Background, Camera, Cloud, CloudMaterial, CloudShapes, Filter, ImageSettings, Lens, Light, Material,
-    Model, Paint, Rows, Scene, SceneError, SceneErrors, Source, Visible, fit, rules,
+    Backdrop, Background, Camera, Cloud, CloudMaterial, CloudShapes, Emitter, Filter, ImageSettings, Lens, Light,
+    Material, Model, Paint, RenderSettings, Rows, Scene, SceneError, SceneErrors, Source, Visible, fit, rules,
 };
 
 /// Size of the picture, and samples per pixel.
-const IMAGE: (u32, u32, u32) = (1200, 900, 16);
+const IMAGE: (u32, u32, u32) = (1200, 900, 32);
 /// Degrees; far away, as molecules are usually drawn.
 const VFOV: f64 = 20.0;
 /// Reflected share of light where an atom's colour is white: less than the background.
@@ -41,13 +41,12 @@ pub(in crate::scene) fn read(
     let lens = Lens::Pinhole { vfov: VFOV };
     let camera = Camera { name: None, eye: fit::direction(up), target: DVec3::ZERO, up, lens };
     let (width, height, spp) = IMAGE;
-    let (lights, ambient) = light(&camera);
-    let scene = Scene {
+    let mut scene = Scene {
         image: Some(ImageSettings { width, height, spp, filter: Filter::default() }),
         cameras: vec![camera],
         background: Background { backdrop: Backdrop::Color(DVec3::ONE), ..Background::default() },
-        ambient,
-        lights,
+        ambient: DVec3::splat(AMBIENT),
+        render: RenderSettings { ambient_occlusion: true, ..RenderSettings::default() },
         materials: vec![material("atoms"), material("bonds")],
         warnings: drawn.warnings.clone(),
         clouds: clouds(drawn, [0, 1]),
@@ -56,6 +55,7 @@ pub(in crate::scene) fn read(
     if let Some((row, broken)) = first_broken(&scene) {
         return Err(SceneError::of_file(path, format!("atom {row}: {}", broken.rule), broken.found).into());
     }
+    scene.lights = lights(&scene);
     Ok(Draft { scene, cameras: vec![OpenCamera { index: 0, framed: true, orbit: None }] })
 }
 
@@ -96,18 +96,28 @@ fn material(name: &str) -> Material {
     Material { name: name.to_owned(), model, back: None, visible: Visible::Both }
 }
 
-/// All light of the look: a key light over the left shoulder, a fill light from the right without shadows, and
-/// ambient light that stands for the light of the surroundings, which ambient occlusion would shade.
-fn light(camera: &Camera) -> (Vec<Light>, DVec3) {
+/// Ambient light, which reaches a place as far as that is open: it shows what lies deeper.
+const AMBIENT: f64 = 0.45;
+/// Irradiance over pi of the key light, and of the fill light.
+const KEY: f64 = 0.55;
+const FILL: f64 = 0.05;
+/// How far the key light is, in radii of the scene, and how large it is seen from there: the half angle in degrees, of
+/// which shadows are as soft.
+const KEY_DISTANCE: f64 = 20.0;
+const KEY_ANGLE: f64 = 4.0;
+
+/// The lights of the look beside ambient light: a soft key light over the left shoulder and a fill light from the right
+/// without shadows.
+fn lights(scene: &Scene) -> Vec<Light> {
+    let Some(camera) = scene.cameras.first() else { return Vec::new() };
     let (right, up, forward) = camera.axes();
-    let light = |name: &str, from: [f64; 3], strength: f64, shadows: bool| Light {
-        name: Some(name.to_owned()),
-        shadows,
-        source: Source::Directional {
-            direction: from[0] * right + from[1] * up + from[2] * forward,
-            irradiance: DVec3::splat(PI * strength),
-        },
-    };
-    let lights = vec![light("key", [0.6, -0.8, 0.8], 0.75, true), light("fill", [-0.8, -0.2, 1.0], 0.15, false)];
-    (lights, DVec3::splat(0.15))
+    let along = |[x, y, z]: [f64; 3]| (x * right + y * up + z * forward).normalize();
+    let (center, radius) = fit::ball(scene);
+    let (way, distance) = (along([0.6, -0.8, 0.8]), KEY_DISTANCE * radius);
+    let size = KEY_ANGLE.to_radians().tan();
+    let emitter = Emitter::Disk { center: center - distance * way, normal: way, radius: distance * size };
+    let key = Source::Area { emitter, radiance: DVec3::splat(KEY / (size * size)), visible: false };
+    let fill = Source::Directional { direction: along([-0.8, -0.2, 1.0]), irradiance: DVec3::splat(PI * FILL) };
+    let light = |name: &str, source, shadows| Light { name: Some(name.to_owned()), shadows, source };
+    vec![light("key", key, true), light("fill", fill, false)]
 }

@@ -73,6 +73,7 @@ fn render(render: &RenderSettings) -> Table {
         .set("seed", render.seed)
         .set_some("noise", render.noise.map(number))
         .set_some("ao_distance", distance.map(number))
+        .set_some("ambient_occlusion", render.ambient_occlusion.then_some(true))
 }
 
 fn camera(scene: &Scene, index: usize, camera: &Camera) -> Table {

@@ -133,6 +133,7 @@ fn everything(picture: &Path) -> Scene {
             seed: 1 << 62,
             noise: Some(THIRD),
             ao_distance: 100.0 * THIRD,
+            ambient_occlusion: true,
         },
         cameras: vec![
             camera("front", Lens::Pinhole { vfov: 100.0 * THIRD }),
