@@ -143,6 +143,7 @@ impl Job {
         Description {
             scene: self.scene.file_name().map(|name| name.to_string_lossy().into_owned()),
             scene_hash,
+            settings: Some(self.words(renderer)).filter(|words| !words.is_empty()),
             camera: Some(renderer.view().clone()),
             spp: Some(renderer.image().spp),
             seed: Some(renderer.pattern()),

@@ -22,6 +22,7 @@ pub mod names;
 mod run;
 mod source;
 mod watch;
+mod words;
 mod write;
 
 pub use self::checkpoint::Checkpoint;

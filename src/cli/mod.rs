@@ -6,7 +6,7 @@
 //!
 //! | file | what it is about |
 //! |---|---|
-//! | `render`, `batch`, `info`, `check`, `compare`, `query`, `convert`, `merge`, `status`, `farm`, `manual` | one command each (`manual`: two) |
+//! | `render`, `batch`, `info`, `check`, `verify`, `compare`, `query`, `convert`, `merge`, `status`, `farm`, `manual` | one command each (`manual`: two) |
 //! | `args`, `atoms`, `settings` | words that several commands understand |
 //! | `jobs` | running what `render` and `batch` put on a list |
 //! | `bench`, `gate`, `pareto` | measuring |
@@ -49,6 +49,7 @@ mod stats_json;
 mod status;
 mod stress;
 mod system;
+mod verify;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -73,7 +74,7 @@ Examples:
 
 `octray COMMAND --help` has the options of a command and examples of their use.
 
-Exit codes: 0 done; 1 the answer is no (check, compare, bench gate); 2 wrong usage; 3 a bad input file;
+Exit codes: 0 done; 1 the answer is no (check, verify, compare, bench gate); 2 wrong usage; 3 a bad input file;
 4 an output cannot be written; 5 out of memory or over a limit; 6 the CPU lacks what this
 build needs; 130 and 143 stopped by a signal.";
 
@@ -105,6 +106,8 @@ enum Command {
     Explain(explain::Args),
     /// Run what f32 is bad at, family by family, against exact geometry
     Stress(stress::Args),
+    /// Confirm a picture by rendering it again
+    Verify(verify::Args),
     /// Measure how far apart two pictures are
     Compare(compare::Args),
     /// Trace the rays of a file and write what they meet
@@ -235,6 +238,7 @@ pub fn run() -> ExitCode {
         Command::Check(args) => check::run(args, &run),
         Command::Explain(args) => explain::run(args, &run),
         Command::Stress(args) => stress::run(args, &run),
+        Command::Verify(args) => verify::run(args, &run),
         Command::Compare(args) => compare::run(args, &run),
         Command::Query(args) => query::run(args, &run),
         Command::Bench(args) => bench::run(args, &run),

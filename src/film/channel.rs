@@ -36,6 +36,14 @@ impl Samples {
         self.len() == 0
     }
 
+    /// The bits of one of them, as it is held here.
+    pub fn bits(&self, i: usize) -> u32 {
+        match self {
+            Samples::Half(samples) | Samples::Float(samples) => samples[i].to_bits(),
+            Samples::Uint(samples) => samples[i],
+        }
+    }
+
     /// Some stretches of them, one after another.
     pub fn rows(&self, rows: &[Range<usize>]) -> Samples {
         match self {

@@ -14,6 +14,8 @@ pub struct Description {
     pub scene: Option<String>,
     /// A hash of the scene, in hexadecimal: `render/sceneHash`.
     pub scene_hash: Option<String>,
+    /// The words of the command line that it was rendered with, beside those that say which pixels: `render/settings`.
+    pub settings: Option<String>,
     /// The camera, for `worldToCamera`, `worldToNDC` and the screen window.
     pub camera: Option<Camera>,
     /// Samples per pixel: `render/spp` and `samplesPerPixel`.

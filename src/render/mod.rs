@@ -255,6 +255,11 @@ impl<'s> Renderer<'s> {
         self
     }
 
+    /// The scene.
+    pub fn scene(&self) -> &'s Scene {
+        self.scene
+    }
+
     /// All settings of how radiance is found.
     pub fn settings(&self) -> &RenderSettings {
         &self.settings

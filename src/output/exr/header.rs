@@ -155,6 +155,7 @@ fn own_attributes(description: &Description) -> impl Iterator<Item = (&'static s
     let all = [
         ("render/scene", words(&description.scene)),
         ("render/sceneHash", words(&description.scene_hash)),
+        ("render/settings", words(&description.settings)),
         ("render/spp", description.spp.map(count)),
         ("samplesPerPixel", description.spp.map(count)),
         ("render/seed", description.seed.map(|seed| AttributeValue::Text(text(&seed.to_string())))),

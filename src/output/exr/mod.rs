@@ -84,7 +84,7 @@ impl Compression {
         self.method().may_loose_data()
     }
 
-    fn method(self) -> exr::prelude::Compression {
+    pub(super) fn method(self) -> exr::prelude::Compression {
         use exr::prelude::Compression as Method;
         match self {
             Compression::None => Method::Uncompressed,

@@ -19,7 +19,7 @@ use super::mattes;
 use super::{Contents, Fault, HashPair, check_length, check_pixels};
 use crate::film::{Channel, Picture, Samples, Window};
 use crate::output::color::{self, Primaries};
-use crate::output::exr::{Attributes, PIXEL_HASH};
+use crate::output::exr::{Attributes, ColorSpace, PIXEL_HASH, Storage};
 use crate::output::pixel_hash::{Digests, PixelHash};
 
 impl From<exr::error::Error> for Fault {
@@ -183,9 +183,11 @@ impl Plan {
         let is_float = |channel: &ChannelDescription| {
             color_slot(header, channel.name.as_slice()).is_some() && channel.sample_type != SampleType::F16
         };
+        let float = header.channels.list.iter().any(is_float);
         Ok(Contents {
             picture,
-            float: header.channels.list.iter().any(is_float),
+            float,
+            storage: Some(storage(headers, header, float)),
             attributes: Some(Attributes {
                 shared: header.shared_attributes.clone(),
                 own: header.own_attributes.clone(),
@@ -212,6 +214,19 @@ impl Sums {
             }
         }
         Some(HashPair { stored: stored_hash(headers)?, found: hash.finish() })
+    }
+}
+
+/// How a file is stored, as far as that makes up its samples and their names.
+fn storage(headers: &[Header], color: &Header, float: bool) -> Storage {
+    let compression = crate::output::Compression::ALL.into_iter().find(|known| known.method() == color.compression);
+    let is_aces = primaries(color).is_some_and(|primaries| primaries.is_near(&Primaries::ACESCG));
+    Storage {
+        float,
+        compression: compression.unwrap_or_default(),
+        root_depth: headers.iter().any(|header| has(header, "Z")),
+        color: if is_aces { ColorSpace::AcesCg } else { ColorSpace::Rec709 },
+        ..Storage::default()
     }
 }
 
@@ -266,11 +281,16 @@ fn has(header: &Header, name: &str) -> bool {
     header.channels.list.iter().any(|channel| channel.name == *name)
 }
 
+/// The primaries that a file states.
+fn primaries(header: &Header) -> Option<Primaries> {
+    let found = header.shared_attributes.chromaticities?;
+    let xy = [found.red, found.green, found.blue, found.white].map(|Vec2(x, y)| DVec2::new(x.into(), y.into()));
+    Some(Primaries { xy })
+}
+
 /// The matrix that takes the file's colours to Rec. 709, where they are others.
 fn to_rec709(header: &Header) -> Result<Option<glam::DMat3>, Fault> {
-    let Some(found) = header.shared_attributes.chromaticities else { return Ok(None) };
-    let xy = [found.red, found.green, found.blue, found.white].map(|Vec2(x, y)| DVec2::new(x.into(), y.into()));
-    let primaries = Primaries { xy };
+    let Some(primaries) = primaries(header) else { return Ok(None) };
     if primaries.is_near(&Primaries::REC709) {
         return Ok(None);
     }

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use super::exr::Attributes;
+use super::exr::{Attributes, Storage};
 use crate::film::Picture;
 
 /// Pixels of the largest picture that is read: the largest that a scene may ask for.
@@ -68,6 +68,8 @@ pub struct Contents {
     pub picture: Picture,
     /// Whether colour has more bits than halves.
     pub float: bool,
+    /// Of an EXR: how its samples are stored, whatever makes up their hash.
+    pub storage: Option<Storage>,
     /// Of an EXR: what its header says beside.
     pub attributes: Option<Attributes>,
     /// The hash of its samples that an EXR states, and the one that they have.
@@ -118,6 +120,7 @@ pub fn read_all(path: &Path) -> Result<Contents, ReadError> {
         png::read(reader, length).map(|(picture, float)| Contents {
             picture,
             float,
+            storage: None,
             attributes: None,
             pixel_hash: None,
         })
