@@ -228,14 +228,14 @@ fn text(contents: &Contents, name: &str) -> Option<String> {
 /// The hash of the job's scene and settings.
 fn hash(job: &Job, sources: &Sources, run: &Run) -> Result<String, Failure> {
     let loaded = sources.load(sources.ticket(job));
-    let (scene, _) = loaded.map_err(|errors| scene_file::failure(&job.scene, &errors, run.console.color))?;
-    let renderer = job.renderer(&scene).map_err(|error| Failure::from(error).of(&job.scene))?;
+    let (shared, _) = loaded.map_err(|errors| scene_file::failure(&job.scene, &errors, run.console.color))?;
+    let renderer = job.renderer(&shared.scene).map_err(|error| Failure::from(error).of(&job.scene))?;
     Ok(renderer.scene_hash())
 }
 
 /// How far a window reaches beyond the picture, at most.
 fn beyond(window: Window, (width, height): (u32, u32)) -> u32 {
-    let [width, height] = [width, height].map(|side| i64::from(side));
+    let [width, height] = [width, height].map(i64::from);
     let Window { x0, y0, x1, y1 } = window;
     let [x0, y0, x1, y1] = [x0, y0, x1, y1].map(i64::from);
     let most = [-x0, -y0, x1 - width, y1 - height].into_iter().fold(0, i64::max);
