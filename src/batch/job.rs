@@ -57,6 +57,8 @@ pub struct Settings {
     pub spp: Option<u32>,
     /// Relative error of each tile at which sampling stops.
     pub noise: Option<f64>,
+    /// How long the shutter is open, as a share of the time to the next frame.
+    pub shutter: Option<f64>,
     /// Seed of the sample pattern.
     pub seed: Option<u64>,
     /// Longest chain of rays.
@@ -110,6 +112,9 @@ impl Job {
         }
         if settings.noise.is_some() {
             renderer = renderer.noise(settings.noise);
+        }
+        if let Some(shutter) = settings.shutter {
+            renderer = renderer.shutter(shutter);
         }
         if let Some(depth) = settings.max_depth {
             renderer = renderer.max_depth(depth);

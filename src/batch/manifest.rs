@@ -35,6 +35,7 @@ struct Entry {
     resolution: Option<(u32, u32)>,
     crop: Option<[i32; 4]>,
     spp: Option<u32>,
+    shutter: Option<f64>,
     seed: Option<u64>,
     max_depth: Option<u32>,
     integrator: Option<String>,
@@ -123,6 +124,7 @@ impl Entry {
             resolution: self.resolution.or(other.resolution),
             crop: self.crop.or(other.crop),
             spp: self.spp.or(other.spp),
+            shutter: self.shutter.or(other.shutter),
             seed: self.seed.or(other.seed),
             max_depth: self.max_depth.or(other.max_depth),
             integrator: self.integrator.or_else(|| other.integrator.clone()),
@@ -150,6 +152,10 @@ impl Reader<'_> {
         let settings = &mut job.settings;
         settings.resolution = entry.resolution.or(settings.resolution);
         settings.spp = entry.spp.or(settings.spp);
+        settings.shutter = entry.shutter.or(settings.shutter);
+        if settings.shutter.is_some_and(|shutter| !(0.0..=1.0).contains(&shutter)) {
+            return Err("shutter should be from 0 to 1".to_owned());
+        }
         settings.seed = entry.seed.or(settings.seed);
         settings.max_depth = entry.max_depth.or(settings.max_depth);
         if let Some([x0, y0, x1, y1]) = entry.crop {

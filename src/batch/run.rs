@@ -21,7 +21,7 @@ use super::write::{Finished, Room, Writer, line};
 use super::{Event, Job, JobError, Report, Shard, Sources, Watch, annotate, existing, ledger};
 use crate::output::exr::Encoded;
 use crate::output::{self, Format, OutputError, aside};
-use crate::render::{RenderError, Renderer, Rendering, Task, Traced, pool};
+use crate::render::{RenderError, Renderer, Rendering, Task, Traced, moments, pool};
 use crate::scene::inputs::{Hashes, hex, sha256};
 use crate::scene::{Aov, Scene};
 
@@ -280,16 +280,25 @@ impl Batch<'_> {
             RenderError::Cancelled => JobError::Cancelled,
             error => JobError::Render { path: job.scene.clone(), error },
         };
-        let next = self.next_frame(index, scene);
+        let (next, moments);
         let mut renderer = job.renderer(scene).map_err(failed)?;
+        next = self.next_frame(index, scene, renderer.settings().shutter > 0.0);
         if let Some(next) = &next {
-            renderer = renderer.next_frame(&next.scene);
+            moments = self.moments(shared, next, &renderer);
+            renderer = renderer.next_frame(&next.scene).moments(&moments);
         }
         let wanted = job.settings.layers.layers(scene).unwrap_or(scene.layers);
         if self.options.annotations {
             renderer = renderer.layers(wanted.with(Aov::Ids));
         }
-        let scene_hash = renderer.hash_after(shared.sum());
+        let scene_hash = match &next {
+            // What is blurred depends on where it goes.
+            Some(next) if renderer.settings().shutter > 0.0 => {
+                let both = format!("{} {}", renderer.hash_after(shared.sum()), next.sum().hash(""));
+                sha256(&mut both.as_bytes()).map(|hash| hex(&hash)).unwrap_or_default()
+            }
+            _ => renderer.hash_after(shared.sum()),
+        };
         if self.options.resume && existing::is_current(job, &renderer, &scene_hash) {
             return Ok(None);
         }
@@ -372,16 +381,23 @@ impl Batch<'_> {
         }
     }
 
-    /// The scene that motion leads to, where that is asked for.
-    fn next_frame(&self, index: usize, scene: &Scene) -> Option<Arc<Shared>> {
+    /// The moments that a picture is blurred over; none where nothing moves.
+    fn moments(&self, shared: &Shared, next: &Shared, renderer: &Renderer) -> Vec<Scene> {
+        let (shutter, spp) = (renderer.settings().shutter, renderer.image().spp);
+        let moves = shutter > 0.0 && shared.sum().hash("") != next.sum().hash("");
+        if moves { moments(&shared.scene, &next.scene, shutter, spp) } else { Vec::new() }
+    }
+
+    /// The scene that motion leads to, where that is asked for by a layer or by an open shutter.
+    fn next_frame(&self, index: usize, scene: &Scene, is_open: bool) -> Option<Arc<Shared>> {
         let job = &self.jobs[index];
         let layers = job.settings.layers.layers(scene).ok()?;
-        if !layers.has(Aov::Motion) {
+        if !layers.has(Aov::Motion) && !is_open {
             return None;
         }
         let frame = job.frame() + 1;
         let ticket = self.sources.ticket(&Job { frame: Some(frame), ..job.clone() });
-        let told = |errors| self.warn(index, format!("{job}: motion is 0: there is no frame {frame}: {errors}"));
+        let told = |errors| self.warn(index, format!("{job}: nothing moves: there is no frame {frame}: {errors}"));
         self.sources.load(ticket).map_err(told).ok().map(|(scene, _)| scene)
     }
 
@@ -407,7 +423,10 @@ impl Batch<'_> {
         let window = renderer.window().map_err(|error| JobError::Render { path: Default::default(), error })?;
         let work = format!("a picture of {}x{} pixels", window.width(), window.height());
         let pixels = PIXEL_BYTES.saturating_mul(window.area() as u64);
-        self.watch.room(memory::to_build(scene).saturating_add(pixels), &work).map_err(JobError::Memory)
+        let moments = renderer.moment_count() as u64;
+        self.watch
+            .room(memory::to_build(scene).saturating_mul(moments).saturating_add(pixels), &work)
+            .map_err(JobError::Memory)
     }
 
     /// A hash over all files that the scene of a job names.

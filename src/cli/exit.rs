@@ -85,9 +85,10 @@ impl From<RenderError> for Failure {
     fn from(error: RenderError) -> Self {
         let exit = match error {
             RenderError::NoCamera | RenderError::NoImage | RenderError::Scene(_) => Exit::Input,
-            RenderError::UnknownCamera { .. } | RenderError::BadWindow { .. } | RenderError::NoiseWithLayers => {
-                Exit::Usage
-            }
+            RenderError::UnknownCamera { .. }
+            | RenderError::BadWindow { .. }
+            | RenderError::NoiseWithLayers
+            | RenderError::NoiseWithShutter => Exit::Usage,
             RenderError::Threads(_) | RenderError::Cancelled => Exit::Limit,
         };
         Failure::new(exit, error)

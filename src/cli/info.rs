@@ -213,7 +213,8 @@ fn image(image: &scene::ImageSettings) -> Value {
 }
 
 fn render(scene: &Scene) -> Value {
-    let scene::RenderSettings { integrator, max_depth, seed, noise, ao_distance, ambient_occlusion } = scene.render;
+    let scene::RenderSettings { integrator, max_depth, seed, noise, ao_distance, ambient_occlusion, shutter } =
+        scene.render;
     let integrator = match integrator {
         Integrator::Direct => "direct",
         Integrator::Ao => "ao",
@@ -221,7 +222,7 @@ fn render(scene: &Scene) -> Value {
     };
     json!({
         "integrator": integrator, "max_depth": max_depth, "seed": seed, "noise": noise, "ao_distance": ao_distance,
-        "ambient_occlusion": ambient_occlusion,
+        "ambient_occlusion": ambient_occlusion, "shutter": shutter,
     })
 }
 

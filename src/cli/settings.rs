@@ -37,6 +37,9 @@ pub struct Settings {
     /// least the scene's samples, at most 4096 [default: as in the scene]
     #[arg(long, value_name = "T", value_parser = noise, conflicts_with = "spp", allow_negative_numbers = true)]
     noise: Option<f64>,
+    /// Blur what moves: how long the shutter is open, from 0 to 1 of the time to the next frame [default: as in the scene]
+    #[arg(long, value_name = "S", value_parser = shutter, allow_negative_numbers = true)]
+    shutter: Option<f64>,
     /// How light is found [default: as in the scene]
     #[arg(long, value_enum, value_name = "NAME")]
     integrator: Option<IntegratorName>,
@@ -69,6 +72,12 @@ pub struct Settings {
 fn noise(text: &str) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|number| *number > 0.0 && number.is_finite());
     number.ok_or_else(|| format!("must be a number greater than 0 such as 0.02, found {text:?}"))
+}
+
+/// A part of the time to the next frame.
+fn shutter(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|number| (0.0..=1.0).contains(number));
+    number.ok_or_else(|| format!("must be a number from 0 to 1 such as 0.5, found {text:?}"))
 }
 
 /// Integrators by their names in scene files.
@@ -110,6 +119,7 @@ impl Settings {
             transparent: self.background.is_some(),
             spp: self.spp,
             noise: self.noise,
+            shutter: self.shutter,
             seed: self.seed,
             max_depth: self.max_depth,
             integrator: self.integrator.map(Integrator::from),

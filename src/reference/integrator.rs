@@ -31,6 +31,20 @@ pub struct Pixel {
     pub samples: Vec<CameraSample>,
 }
 
+impl Pixel {
+    /// Adds the next samples of the same pixel, which are this share of all.
+    pub fn absorb(&mut self, more: Pixel, share: f64) {
+        self.rgba.iter_mut().zip(more.rgba).for_each(|(sum, mean)| *sum += share * mean);
+        self.rays.camera += more.rays.camera;
+        self.rays.shadow += more.rays.shadow;
+        self.rays.reflection += more.rays.reflection;
+        self.rays.refraction += more.rays.refraction;
+        self.rays.bounce += more.rays.bounce;
+        self.events.extend(more.events);
+        self.samples.extend(more.samples);
+    }
+}
+
 /// One sample of a pixel: what layers beside the colour are made of.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct CameraSample {

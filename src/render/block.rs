@@ -41,7 +41,7 @@ pub struct BlockWork {
 
 impl BlockWork {
     /// Adds the counts of more work on the same block.
-    fn absorb(&mut self, more: &BlockWork) {
+    pub fn absorb(&mut self, more: &BlockWork) {
         self.rays.add(&more.rays);
         self.tests.add(&more.tests);
         self.left_out.add(&more.left_out);

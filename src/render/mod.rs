@@ -6,6 +6,7 @@ mod coverage;
 mod layers;
 mod query;
 mod reference;
+mod shutter;
 mod stats;
 mod task;
 mod tiles;
@@ -21,6 +22,7 @@ use rayon::prelude::*;
 pub use self::adaptive::Reached;
 pub use self::layers::IdNames;
 pub use self::query::{Answers, Batch, Query};
+pub use self::shutter::moments;
 pub use self::stats::Stats;
 pub use self::task::{Task, Traced};
 
@@ -99,6 +101,9 @@ pub enum RenderError {
         "the reference engine renders layers with as many samples for all pixels: leave the noise level or the layers out"
     )]
     NoiseWithLayers,
+    /// Moments have as many samples each.
+    #[error("motion blur needs as many samples for all pixels: leave the noise level or the shutter out")]
+    NoiseWithShutter,
     /// The threads could not be started.
     #[error("cannot start threads: {0}")]
     Threads(String),
@@ -124,6 +129,7 @@ pub struct Renderer<'s> {
     image: ImageSettings,
     layers: Layers,
     next: Option<&'s Scene>,
+    moments: &'s [Scene],
     window: Option<Window>,
     overscan: [u32; 2],
     settings: RenderSettings,
@@ -176,6 +182,7 @@ impl<'s> Renderer<'s> {
             image: scene.image.clone().ok_or(RenderError::NoImage)?,
             layers: scene.layers,
             next: None,
+            moments: &[],
             window: None,
             overscan: [0; 2],
             settings: scene.render.clone(),
@@ -228,6 +235,20 @@ impl<'s> Renderer<'s> {
     /// The scene at the next frame, which the motion layer leads to; without one nothing moves.
     pub fn next_frame(mut self, next: &'s Scene) -> Self {
         self.next = Some(next);
+        self
+    }
+
+    /// How long the shutter is open, as a share of the time to the next frame; what [`moments`](Renderer::moments) the
+    /// picture is of is another matter.
+    pub fn shutter(mut self, share: f64) -> Self {
+        self.settings.shutter = share;
+        self
+    }
+
+    /// The scene at [moments] while the shutter is open: the samples of each pixel are shared out over them, in order.
+    /// Layers, too, are of what those samples see. Without any the picture is of one moment.
+    pub fn moments(mut self, moments: &'s [Scene]) -> Self {
+        self.moments = moments;
         self
     }
 

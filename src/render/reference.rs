@@ -5,7 +5,7 @@ use std::time::Instant;
 use glam::{DVec2, DVec3};
 
 use super::layers::{LayerPlan, LayerWork, Near, Sums};
-use super::{Renderer, Stats};
+use super::{Renderer, Stats, shutter};
 use crate::film::{Picture, Window};
 use crate::integrate::{RayCounts, RayKind};
 use crate::plan::Kind;
@@ -15,8 +15,9 @@ use crate::shapes::RowRef;
 /// A frame whose rows are its blocks. There are no columns, no tree and no tests to count; of the shadow rays it is
 /// not known how many met something.
 pub(super) struct Rows {
-    tracer: Reference,
-    view: View,
+    /// By moment.
+    tracers: Vec<(Reference, View)>,
+    spp: u32,
     window: Window,
     /// What the tracer's coordinates are relative to.
     origin: DVec3,
@@ -35,22 +36,28 @@ pub(super) struct RowWork {
 impl Rows {
     pub fn new(renderer: &Renderer, window: Window) -> Self {
         let start = Instant::now();
-        let tracer = Reference::relative_to(renderer.scene, renderer.camera.eye);
-        let view = tracer.view(renderer.camera, &renderer.image, &renderer.settings);
-        Rows { tracer, view, window, origin: renderer.camera.eye, plan_seconds: start.elapsed().as_secs_f64() }
+        let origin = renderer.camera.eye;
+        let then = |renderer: &Renderer| {
+            let tracer = Reference::relative_to(renderer.scene, origin);
+            let view = tracer.view(renderer.camera, &renderer.image, &renderer.settings);
+            (tracer, view)
+        };
+        let tracers = renderer.at_moments().iter().map(then).collect();
+        let spp = renderer.image.spp;
+        Rows { tracers, spp, window, origin, plan_seconds: start.elapsed().as_secs_f64() }
     }
 
     /// A row, counted from 0; `None` where `stop` asked for that within.
     pub fn trace(&self, row: usize, layers: Option<&LayerPlan>, stop: &(dyn Fn() -> bool + Sync)) -> Option<RowWork> {
         let (mut counts, y) = (RayCounts::default(), self.window.y0 + row as i32);
-        let (width, spp) = (self.window.width(), self.view.samples());
+        let (width, spp) = (self.window.width(), self.spp);
         let mut sums = layers.map(|plan| (plan, Sums::new(plan, width, spp)));
         let mut places = Vec::new();
         let mut pixel = |(index, x)| {
             if stop() {
                 return None;
             }
-            let pixel = self.tracer.pixel(&self.view, x, y);
+            let pixel = self.pixel(x, y);
             add(&mut counts, &pixel);
             if let Some((plan, sums)) = &mut sums {
                 add_layers(plan, sums, index, &pixel);
@@ -62,6 +69,17 @@ impl Rows {
         let pixels = pixels?;
         let layers = sums.map(|(plan, sums)| sums.finish(plan, |pixel, _| places[pixel]));
         Some(RowWork { row, pixels, counts, layers })
+    }
+
+    /// The samples of all moments.
+    fn pixel(&self, x: i32, y: i32) -> Pixel {
+        let mut all = Pixel::default();
+        for (moment, (tracer, view)) in self.tracers.iter().enumerate() {
+            let range = shutter::samples(moment, self.tracers.len(), self.spp);
+            let share = range.len() as f64 / f64::from(self.spp);
+            all.absorb(tracer.samples(view, x, y, range), share);
+        }
+        all
     }
 
     pub fn stats(&self, threads: usize, trace_seconds: f64) -> Stats {

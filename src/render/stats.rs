@@ -38,6 +38,15 @@ pub struct Stats {
 }
 
 impl Stats {
+    /// Adds what the frame of another moment took to prepare.
+    pub(super) fn prepared(mut self, other: &Stats) -> Self {
+        self.plan_seconds += other.plan_seconds;
+        self.build_seconds += other.build_seconds;
+        self.column_bytes += other.column_bytes;
+        self.tree_bytes += other.tree_bytes;
+        self
+    }
+
     pub(super) fn add(&mut self, work: &BlockWork) {
         self.rays.add(&work.rays);
         self.tests.add(&work.tests);

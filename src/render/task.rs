@@ -2,6 +2,7 @@
 //!
 //! [`Renderer::render`] gives all blocks to the threads of one pool; a batch hands out those of several pictures.
 
+use std::ops::Range;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -10,9 +11,9 @@ use super::block::{Block, BlockWork};
 use super::layers::{LayerPlan, LayerTape};
 use super::reference::{RowWork, Rows};
 use super::tiles::{TileWork, Tiles};
-use super::{Engine, Frame, IdNames, RenderError, Renderer, Rendering};
+use super::{Engine, Frame, IdNames, RenderError, Renderer, Rendering, shutter};
 use crate::film::{Picture, Samples, Window};
-use crate::integrate::Silent;
+use crate::integrate::{Record, Silent};
 use crate::plan::Skip;
 use crate::scene::{Aov, Layers};
 
@@ -31,8 +32,8 @@ pub struct Task<'s> {
 }
 
 enum Work<'s> {
-    /// By the engine, squares of pixels.
-    Blocks(Box<Frame<'s>>, Vec<Block>),
+    /// By the engine, squares of pixels, a frame a moment.
+    Blocks(Vec<Frame<'s>>, Vec<Block>),
     /// By the reference, rows.
     Rows(Box<Rows>),
     /// By the reference to a noise level, squares of pixels.
@@ -87,15 +88,19 @@ impl<'s> Task<'s> {
     /// Plans and builds, on this thread.
     ///
     /// # Errors
-    /// [`RenderError::BadWindow`].
+    /// [`RenderError::BadWindow`]; settings that do not go together.
     pub fn new(renderer: &Renderer<'s>) -> Result<Self, RenderError> {
         let window = renderer.checked_window()?;
+        if renderer.noise_level().is_some() && !renderer.moments.is_empty() {
+            return Err(RenderError::NoiseWithShutter);
+        }
         let work = match (renderer.engine, renderer.noise_level()) {
             (Engine::Reference, Some(_)) if !renderer.layers.is_empty() => return Err(RenderError::NoiseWithLayers),
             (Engine::Reference, Some(noise)) => Work::Tiles(Box::new(Tiles::new(renderer, noise, window))),
             (Engine::Reference, None) => Work::Rows(Box::new(Rows::new(renderer, window))),
             (Engine::Packet | Engine::Single, _) => {
-                Work::Blocks(Box::new(Frame::prepare(renderer)), Block::cover(window))
+                let frames = renderer.at_moments().iter().map(Frame::prepare).collect();
+                Work::Blocks(frames, Block::cover(window))
             }
         };
         let display = (renderer.image.width, renderer.image.height);
@@ -136,9 +141,9 @@ impl<'s> Task<'s> {
     /// Traces a block, counted from 0, on this thread; `None` where `stop` asked for that within.
     pub fn trace(&self, block: usize, stop: &(dyn Fn() -> bool + Sync)) -> Option<Traced> {
         let part = match &self.work {
-            Work::Blocks(frame, blocks) => {
+            Work::Blocks(frames, blocks) => {
                 let block = blocks[block];
-                Part::Block(block, self.trace_block(frame, &block, stop)?)
+                Part::Block(block, self.trace_block(frames, &block, stop)?)
             }
             Work::Rows(rows) => Part::Row(rows.trace(block, self.layers.as_ref(), stop)?),
             Work::Tiles(tiles) => Part::Tile(tiles.trace(block, stop)?),
@@ -155,18 +160,18 @@ impl<'s> Task<'s> {
         }
     }
 
-    fn trace_block(&self, frame: &Frame, block: &Block, stop: &(dyn Fn() -> bool + Sync)) -> Option<BlockWork> {
-        if let Some(noise) = &frame.noise {
-            return self.trace_until(frame, noise, block, stop);
+    fn trace_block(&self, frames: &[Frame], block: &Block, stop: &(dyn Fn() -> bool + Sync)) -> Option<BlockWork> {
+        if let Some(noise) = &frames[0].noise {
+            return self.trace_until(frames, noise, block, stop);
         }
         let Some(plan) = &self.layers else {
-            return block.trace(&frame.view(), &frame.direct(), 0..self.spp, &mut Silent, stop);
+            return self.trace_moments(frames, block, &mut Silent, |_, _| {}, stop);
         };
         // What a pixel costs depends on those that are traced with it: they must not depend on a crop.
         let asked_for_cost = plan.layers.has(Aov::Cost) && !self.unasked;
         let whole = if asked_for_cost { block.whole() } else { *block };
-        let mut tape = LayerTape::new(frame, plan, whole.window.area());
-        let mut work = whole.trace(&frame.view(), &frame.direct(), 0..self.spp, &mut tape, stop)?;
+        let mut tape = LayerTape::new(frames, plan, whole.window.area());
+        let mut work = self.trace_moments(frames, &whole, &mut tape, LayerTape::at, stop)?;
         work.layers = Some(tape.finish(whole.window));
         if whole.window != block.window {
             block.cut(&whole, &mut work);
@@ -174,19 +179,53 @@ impl<'s> Task<'s> {
         Some(work)
     }
 
+    /// The samples of each moment in turn; `at` tells the record which one it is.
+    fn trace_moments<R: Record>(
+        &self,
+        frames: &[Frame],
+        block: &Block,
+        record: &mut R,
+        at: impl Fn(&mut R, usize),
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Option<BlockWork> {
+        let mut trace = |moment: usize, range: Range<u32>| {
+            at(record, moment);
+            let frame = &frames[moment];
+            block.trace(&frame.view(), &frame.direct(), range, record, stop)
+        };
+        if frames.len() == 1 {
+            return trace(0, 0..self.spp);
+        }
+        let (mut sums, mut all) = (vec![[0.0; 4]; block.window.area()], None::<BlockWork>);
+        for moment in 0..frames.len() {
+            let range = shutter::samples(moment, frames.len(), self.spp);
+            let share = range.len() as f64 / f64::from(self.spp);
+            let work = trace(moment, range)?;
+            for (sum, pixel) in sums.iter_mut().zip(&work.pixels) {
+                *sum = std::array::from_fn(|k| sum[k] + share * f64::from(pixel[k]));
+            }
+            match &mut all {
+                None => all = Some(work),
+                Some(all) => all.absorb(&work),
+            }
+        }
+        let pixels = sums.into_iter().map(|sum| sum.map(|x| x as f32)).collect();
+        all.map(|all| BlockWork { pixels, ..all })
+    }
+
     /// To a noise level: layers are those of the first samples.
     fn trace_until(
         &self,
-        frame: &Frame,
+        frames: &[Frame],
         noise: &Noise,
         block: &Block,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<BlockWork> {
-        let (whole, direct, views) = (block.whole(), frame.direct(), frame.views());
+        let (whole, direct, views) = (block.whole(), frames[0].direct(), frames[0].views());
         let mut work = match &self.layers {
             None => block.trace_until(noise, views, &direct, &mut Silent, stop)?,
             Some(plan) => {
-                let mut tape = LayerTape::new(frame, plan, whole.window.area());
+                let mut tape = LayerTape::new(frames, plan, whole.window.area());
                 let work = block.trace_until(noise, views, &direct, &mut tape, stop)?;
                 BlockWork { layers: Some(tape.finish(whole.window)), ..work }
             }
@@ -200,7 +239,10 @@ impl<'s> Task<'s> {
         let seconds = start.elapsed().as_secs_f64();
         let mut picture = Picture::new(self.display, self.window);
         let mut stats = match &self.work {
-            Work::Blocks(frame, _) => frame.stats(threads, seconds),
+            Work::Blocks(frames, _) => {
+                let first = frames[0].stats(threads, seconds);
+                frames[1..].iter().fold(first, |stats, frame| stats.prepared(&frame.stats(threads, seconds)))
+            }
             Work::Rows(rows) => rows.stats(threads, seconds),
             Work::Tiles(tiles) => tiles.stats(threads, seconds),
         };
@@ -218,8 +260,8 @@ impl<'s> Task<'s> {
                 }
             }
         }
-        if let Work::Blocks(frame, _) = &self.work {
-            stats.skipped = frame.plan.skips.report(&stats.left_out);
+        if let Work::Blocks(frames, _) = &self.work {
+            stats.skipped = frames[0].plan.skips.report(&stats.left_out);
         }
         let mut names = IdNames::default();
         if let Some(plan) = self.layers.as_ref().filter(|_| !self.unasked) {

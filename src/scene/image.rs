@@ -29,6 +29,8 @@ pub struct RenderSettings {
     pub ao_distance: f64,
     /// Whether ambient light reaches a place only from where nothing is nearer than that, but for `Ao`, which has none.
     pub ambient_occlusion: bool,
+    /// How long the shutter is open, from the frame on, as a share (0 to 1) of the time to the next one.
+    pub shutter: f64,
 }
 
 impl Default for RenderSettings {
@@ -40,6 +42,7 @@ impl Default for RenderSettings {
             noise: None,
             ao_distance: f64::INFINITY,
             ambient_occlusion: false,
+            shutter: 0.0,
         }
     }
 }

@@ -23,7 +23,32 @@ const PART: usize = 1 << 16;
 pub fn files(scene: &Path, frame: i64) -> Vec<PathBuf> {
     let mut found = Vec::new();
     add(scene, frame, 0, &mut found);
+    if found.iter().any(|path| looks_ahead(path)) {
+        let mut next = Vec::new();
+        add(scene, frame + 1, 0, &mut next);
+        next.retain(|path| !found.contains(path));
+        found.extend(next);
+    }
     found
+}
+
+/// Whether a scene file asks for what depends on the next frame too: motion, or a shutter that is open for some time.
+fn looks_ahead(path: &Path) -> bool {
+    let Some(text) = fs::read_to_string(path).ok().filter(|_| is_scene(path)) else { return false };
+    let (root, _) = DeTable::parse_recoverable(&text);
+    let value = |table: &str, key: &str| match root.get_ref().get(table)?.get_ref() {
+        DeValue::Table(table) => table.get(key).map(|value| value.get_ref().clone()),
+        _ => None,
+    };
+    let mut layers = Vec::new();
+    if let Some(names) = value("image", "aovs") {
+        texts(&names, &mut layers);
+    }
+    value("render", "shutter").is_some() || layers.iter().any(|name| name == "motion" || name == "all")
+}
+
+fn is_scene(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
 }
 
 fn add(path: &Path, frame: i64, depth: usize, found: &mut Vec<PathBuf>) {
@@ -31,8 +56,7 @@ fn add(path: &Path, frame: i64, depth: usize, found: &mut Vec<PathBuf>) {
         return;
     }
     found.push(path.to_owned());
-    let is_scene = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
-    if !is_scene || depth >= DEEPEST {
+    if !is_scene(path) || depth >= DEEPEST {
         return;
     }
     let Ok(text) = fs::read_to_string(path) else { return };
@@ -166,6 +190,10 @@ mod tests {
             assert_ne!(now, last, "{name}");
             last = now;
         }
+        let shutter = fs::read_to_string(&scene).unwrap() + "[render]\nshutter = 0.5\n";
+        write("s.toml", &shutter);
+        assert_eq!(names(1), ["s.toml", "base.toml", "a.png", "p.01.npy", "r.csv", "p.02.npy"]);
+        last = hashes.scene(&scene, 1).unwrap();
         write("other.csv", "x");
         assert_eq!(hashes.scene(&scene, 1).unwrap(), last);
         assert!(hashes.scene(&room.path().join("gone.toml"), 1).is_err());

@@ -8,6 +8,7 @@
 
 mod animation;
 mod background;
+mod between;
 mod camera;
 mod cloud;
 pub mod cloud_file;

@@ -55,6 +55,8 @@ impl Rule {
     pub const POSITIVE: Rule = Rule { limit: BRIGHTEST, ..Rule::LENGTH };
     /// A component of a colour, radiance or intensity, or a weight of one.
     pub const COLOR: Rule = Rule { limit: BRIGHTEST, ..Rule::LENGTH_OR_ZERO };
+    /// A part of a whole.
+    pub const SHARE: Rule = Rule { holds: |x| (0.0..=1.0).contains(&x), text: "must be from 0 to 1", ..Rule::FINITE };
     /// The angle of view of a camera, degrees.
     pub const VFOV: Rule =
         Rule { holds: |x| x > 0.0 && x < 180.0, text: "must be greater than 0 and less than 180", ..Rule::FINITE };

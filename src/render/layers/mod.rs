@@ -21,7 +21,7 @@ pub(super) use self::near::Near;
 pub(super) use self::sums::{LayerWork, Sums};
 pub(super) use self::tape::LayerTape;
 
-use super::Renderer;
+use super::{Renderer, shutter};
 use crate::film::{Channel, Cryptomatte, Picture, Samples, Window};
 use crate::scene::{Aov, Camera, Layers, Objects, Scene, carried};
 
@@ -37,6 +37,9 @@ pub(super) struct LayerPlan<'s> {
     display: (u32, u32),
     /// Scene and camera at the next frame.
     next: Option<(&'s Scene, &'s Camera)>,
+    /// The scene while the shutter is open, where that is for some time.
+    moments: &'s [Scene],
+    spp: u32,
     pub objects: Objects,
     /// Bits of the ids of each Cryptomatte that is asked for, by key.
     ids: [Vec<u32>; Aov::CRYPTOMATTES.len()],
@@ -52,12 +55,14 @@ enum Kind {
 
 impl<'s> LayerPlan<'s> {
     pub fn new(renderer: &Renderer<'s>, layers: Layers) -> Self {
-        let Renderer { scene, camera, .. } = *renderer;
+        let Renderer { scene, camera, moments, .. } = *renderer;
+        let spp = renderer.image.spp;
         let objects = Objects::new(scene, layers.instances);
         let display = (renderer.image.width, renderer.image.height);
         // The same camera: by its name, or the first one.
         let next = renderer.next.and_then(|next| Some((next, next.camera(camera.name.as_deref())?)));
-        let mut plan = LayerPlan { layers, scene, camera, display, next, objects, ids: Default::default() };
+        let mut plan =
+            LayerPlan { layers, scene, camera, display, next, moments, spp, objects, ids: Default::default() };
         plan.ids = Aov::CRYPTOMATTES.map(|aov| match layers.has(aov) {
             true => (0..plan.keys(aov)).into_par_iter().map(|key| Cryptomatte::id(&plan.name(aov, key))).collect(),
             false => Vec::new(),
@@ -66,7 +71,11 @@ impl<'s> LayerPlan<'s> {
     }
 
     /// Pixels that a point of a primitive moves to the next frame, right and up.
-    fn motion(&self, primitive: u32, point: DVec3) -> [f32; 2] {
+    fn motion(&self, near: &Near, point: DVec3) -> [f32; 2] {
+        let primitive = near.primitive;
+        let seen = self.moments.get(shutter::moment(near.sample, self.moments.len().max(1), self.spp));
+        // From where it was when the sample saw it.
+        let point = seen.map_or(point, |seen| carried(seen, self.scene, primitive as usize, point));
         let way = || {
             let (next, camera) = self.next?;
             let before = self.camera.project(self.display, point)?;

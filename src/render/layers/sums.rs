@@ -140,7 +140,7 @@ impl Sums {
                 Aov::Motion => {
                     let moves = self.near.iter().zip(&places).map(|(near, place)| match near.row {
                         RowRef::MISS => [0.0; 2],
-                        _ => plan.motion(near.primitive, place.0),
+                        _ => plan.motion(near, place.0),
                     });
                     let moves: Vec<_> = moves.collect();
                     (0..2).for_each(|k| work.floats(moves.iter().map(|way| way[k])));

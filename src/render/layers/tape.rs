@@ -10,14 +10,15 @@ use crate::film::Window;
 use crate::integrate::{RayCounts, RayKind, Record, Samples8, Seen, Silent, Summed, Taken};
 use crate::lanes::{Float8, LANES, Mask8, Ray, Vec3x8};
 use crate::plan::Owner;
-use crate::render::Frame;
+use crate::render::{Frame, shutter};
 use crate::scene::Aov;
 use crate::shade::attributes;
 use crate::shapes::{Ray64, RowRef};
 
 /// Listens to the engine while it renders a block.
 pub(in crate::render) struct LayerTape<'a, 's> {
-    frame: &'a Frame<'s>,
+    /// By moment; one where the shutter is open for no time.
+    frames: &'a [Frame<'s>],
     plan: &'a LayerPlan<'s>,
     /// What depth is counted along; `None`: along each ray.
     axis: Option<[f32; 3]>,
@@ -57,7 +58,7 @@ impl Met {
 }
 
 impl<'a, 's> LayerTape<'a, 's> {
-    pub fn new(frame: &'a Frame<'s>, plan: &'a LayerPlan<'s>, pixels: usize) -> Self {
+    pub fn new(frames: &'a [Frame<'s>], plan: &'a LayerPlan<'s>, pixels: usize) -> Self {
         let zero = [Vec3x8::ZERO; PACKETS];
         let tile = Met {
             hit: [0; PACKETS],
@@ -69,14 +70,20 @@ impl<'a, 's> LayerTape<'a, 's> {
             owners: [[Owner::default(); LANES]; PACKETS],
             materials: [[0; LANES]; PACKETS],
         };
-        let axis = frame.axis.map(|axis| axis.as_vec3().to_array());
-        LayerTape { frame, plan, axis, sums: Sums::new(plan, pixels, frame.spp), tile: Box::new(tile) }
+        let axis = frames[0].axis.map(|axis| axis.as_vec3().to_array());
+        LayerTape { frames, plan, axis, sums: Sums::new(plan, pixels, frames[0].spp), tile: Box::new(tile) }
+    }
+
+    /// What comes next is seen at this moment.
+    pub fn at(&mut self, moment: usize) {
+        self.axis = self.frames[moment].axis.map(|axis| axis.as_vec3().to_array());
     }
 
     /// The layers of the block that was rendered.
     pub fn finish(self, block: Window) -> LayerWork {
-        let LayerTape { frame, plan, sums, .. } = self;
-        sums.finish(plan, |pixel, near| place(frame, block.pixel(pixel), near))
+        let LayerTape { frames, plan, sums, .. } = self;
+        let frame = |near: &Near| &frames[shutter::moment(near.sample, frames.len(), frames[0].spp)];
+        sums.finish(plan, |pixel, near| place(frame(near), block.pixel(pixel), near))
     }
 
     /// Of the samples of a packet the nearest to the centre of each pixel, the first of equals.

@@ -198,6 +198,7 @@ fn render(table: Table<'_>) -> Option<RenderSettings> {
     let integrator = table.or("integrator", Integrator::Direct, choice(INTEGRATORS));
     let ao_distance = table.or("ao_distance", f64::INFINITY, number(Rule::LENGTH));
     let ambient_occlusion = table.or("ambient_occlusion", false, flag);
+    let shutter = table.or("shutter", 0.0, number(Rule::SHARE));
     let max_depth = table.or("max_depth", 5, whole(1, DEEPEST));
     let seed = table.or("seed", 0, whole(0, u64::MAX));
     let noise = table.maybe("noise", number(Rule::POSITIVE));
@@ -209,6 +210,7 @@ fn render(table: Table<'_>) -> Option<RenderSettings> {
         noise: noise?,
         ao_distance: ao_distance?,
         ambient_occlusion: ambient_occlusion?,
+        shutter: shutter?,
     })
 }
 

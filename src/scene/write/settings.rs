@@ -74,6 +74,7 @@ fn render(render: &RenderSettings) -> Table {
         .set_some("noise", render.noise.map(number))
         .set_some("ao_distance", distance.map(number))
         .set_some("ambient_occlusion", render.ambient_occlusion.then_some(true))
+        .set_some("shutter", (render.shutter > 0.0).then(|| number(render.shutter)))
 }
 
 fn camera(scene: &Scene, index: usize, camera: &Camera) -> Table {

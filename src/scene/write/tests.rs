@@ -134,6 +134,7 @@ fn everything(picture: &Path) -> Scene {
             noise: Some(THIRD),
             ao_distance: 100.0 * THIRD,
             ambient_occlusion: true,
+            shutter: THIRD,
         },
         cameras: vec![
             camera("front", Lens::Pinhole { vfov: 100.0 * THIRD }),
