@@ -22,8 +22,9 @@ impl Visit for Packet<'_> {
     fn visit<P: Part>(self, store: &Store<P>) -> u32 {
         let rays = self.0;
         let hit = |row: usize| {
-            let anchor = P::anchor(&store.splat(row), &rays.origin, |_| store.part(row));
-            let hit = P::hit::<false, true>(&anchor, rays, &Hidden8::NONE);
+            let rows = store.splat(row);
+            let anchor = P::anchor(&rows, &rays.origin);
+            let hit = P::hit::<false, true>(&rows, &anchor, rays, &Hidden8::NONE, |_| store.part(row));
             assert!(!hit.doubt.any());
             hit.mask.bits().count_ones()
         };
@@ -39,8 +40,8 @@ impl Visit for Block<'_> {
     #[inline(never)]
     fn visit<P: Part>(self, store: &Store<P>) -> u32 {
         let hit = |ray: &RayPacket| {
-            let anchor = P::anchor(store.block(0), &ray.origin, |lane| store.part(lane));
-            let hit = P::hit::<false, true>(&anchor, ray, &Hidden8::NONE);
+            let anchor = P::anchor(store.block(0), &ray.origin);
+            let hit = P::hit::<false, true>(store.block(0), &anchor, ray, &Hidden8::NONE, |lane| store.part(lane));
             assert!(!hit.doubt.any());
             hit.mask.bits().count_ones()
         };

@@ -94,8 +94,9 @@ impl Visit for Brute<'_> {
         let met = self.0.iter().map(|(at, rays)| {
             let mut rays = *rays;
             for row in (0..store.blocks() * LANES).filter(|row| store.part(*row).is_some()) {
-                let anchor = P::anchor(&store.splat(row), &rays.origin, |_| store.part(row));
-                let hit = P::hit::<false, true>(&anchor, &rays, &Hidden8::NONE);
+                let rows = store.splat(row);
+                let anchor = P::anchor(&rows, &rays.origin);
+                let hit = P::hit::<false, true>(&rows, &anchor, &rays, &Hidden8::NONE, |_| store.part(row));
                 rays.t_max = hit.mask.select(hit.t.fast_min(rays.t_max), rays.t_max);
             }
             (*at, rays.t_max)

@@ -1,4 +1,4 @@
-//! Builds the tree: a binary one by PLOC with reinsertion, leaves of one kind by the surface area
+//! Builds the tree: a binary one by PLOC with reinsertion, leaves whose parts one kind holds by the surface area
 //! heuristic, then eight children a node, and the parts in the order of their leaves.
 
 use glam::{DVec3, Vec3, Vec3A};
@@ -21,7 +21,7 @@ const MOST_ROWS: u32 = 8;
 /// Cost of a row in a leaf where that of a binary node, and of opening a leaf, is 1, for the surface area heuristic.
 /// Rows share a block and a kernel call, so eight of them cost a single ray what one does, and full leaves are what
 /// keeps a large scene in the caches; a packet tests them one by one.
-const ROW_COST: f32 = 0.25;
+const ROW_COST: f32 = 0.1;
 /// The same for a sphere, which is the cheapest to test.
 const SPHERE_COST: f32 = 0.125;
 
@@ -148,6 +148,9 @@ fn build_binary(items: &[Item]) -> Bvh2 {
     binary
 }
 
+/// A part among those of its kind.
+type Place = (Kind, u32);
+
 /// From the binary tree to the wide one.
 struct Widen<'a> {
     binary: &'a Bvh2,
@@ -156,7 +159,7 @@ struct Widen<'a> {
     leaf: Vec<u32>,
     nodes: Vec<Node>,
     /// By kind: parts in the order of their rows.
-    order: Vec<Vec<u32>>,
+    order: Vec<Vec<Place>>,
     groups: Groups,
     /// Levels of nodes.
     depth: usize,
@@ -217,8 +220,9 @@ impl<'a> Widen<'a> {
         (open, count)
     }
 
+    /// A leaf takes the kind that holds all its parts.
     fn add_leaf(&mut self, root: u32) -> Child {
-        let (mut below, mut kind, mut count) = (vec![root], Kind::Sphere, 0);
+        let (mut below, mut places, mut kind) = (vec![root], Vec::with_capacity(LANES), None);
         while let Some(index) = below.pop() {
             let node = &self.binary.nodes[index as usize];
             if node.prim_count == 0 {
@@ -227,12 +231,13 @@ impl<'a> Widen<'a> {
             }
             let range = node.first_index as usize..(node.first_index + node.prim_count) as usize;
             for item in &self.binary.primitive_indices[range] {
-                let item = &self.items[*item as usize];
-                kind = item.kind;
-                count += 1;
-                self.order[kind as usize].push(item.index);
+                let Item { kind: own, index, .. } = self.items[*item as usize];
+                kind = kind.map_or(Some(own), |kind: Kind| kind.holding(own));
+                places.push((own, index));
             }
         }
+        let (kind, count) = (kind.expect("leaves hold parts that go together"), places.len());
+        self.order[kind as usize].extend(places);
         let groups = &mut self.groups[kind as usize];
         groups.push(count as u8);
         Child::leaf(Leaf { kind, block: groups.len() - 1, count })
@@ -264,7 +269,7 @@ fn choose_leaves(binary: &Bvh2, items: &[Item]) -> Vec<u32> {
         let children = node.first_index as usize;
         let (a, b) = (below[children], below[children + 1]);
         let split = a.cost + b.cost + area;
-        let kind = a.kind.filter(|_| a.kind == b.kind);
+        let kind = a.kind.zip(b.kind).and_then(|(a, b)| a.holding(b));
         let count = a.count.saturating_add(b.count);
         let whole = area * leaf_cost(kind, count);
         let fits = kind.is_some() && count <= MOST_ROWS && whole <= split;
@@ -289,20 +294,33 @@ struct Below {
     cost: f32,
 }
 
-fn reorder(parts: Parts, order: &[Vec<u32>]) -> Parts {
-    fn pick<P: Part>(parts: Vec<P>, order: &[Vec<u32>], kind: Kind) -> Vec<P> {
-        order[kind as usize].par_iter().map(|i| parts[*i as usize].clone()).collect()
+fn reorder(parts: Parts, order: &[Vec<Place>]) -> Parts {
+    fn pick<P: Part>(order: &[Vec<Place>], kind: Kind, part: impl Fn(&Place) -> P + Sync + Send) -> Vec<P> {
+        order[kind as usize].par_iter().map(part).collect()
     }
+    fn same<P: Part>(parts: &[P], order: &[Vec<Place>], kind: Kind) -> Vec<P> {
+        pick(order, kind, |(_, i)| parts[*i as usize].clone())
+    }
+    let Parts { triangles, quads, octagons, .. } = &parts;
+    let quad = |(kind, i): &Place| match kind {
+        Kind::Triangle => triangles[*i as usize].with_corners(),
+        _ => quads[*i as usize],
+    };
+    let octagon = |(kind, i): &Place| match kind {
+        Kind::Triangle => triangles[*i as usize].with_corners(),
+        Kind::Quad => quads[*i as usize].with_corners(),
+        _ => octagons[*i as usize],
+    };
     Parts {
-        spheres: pick(parts.spheres, order, Kind::Sphere),
+        spheres: same(&parts.spheres, order, Kind::Sphere),
+        disks: same(&parts.disks, order, Kind::Disk),
+        triangles: same(triangles, order, Kind::Triangle),
+        quads: pick(order, Kind::Quad, quad),
+        octagons: pick(order, Kind::Octagon, octagon),
+        boxes: same(&parts.boxes, order, Kind::Box),
+        turned_boxes: same(&parts.turned_boxes, order, Kind::TurnedBox),
+        cylinders: same(&parts.cylinders, order, Kind::Cylinder),
+        cones: same(&parts.cones, order, Kind::Cone),
         planes: parts.planes,
-        disks: pick(parts.disks, order, Kind::Disk),
-        triangles: pick(parts.triangles, order, Kind::Triangle),
-        quads: pick(parts.quads, order, Kind::Quad),
-        octagons: pick(parts.octagons, order, Kind::Octagon),
-        boxes: pick(parts.boxes, order, Kind::Box),
-        turned_boxes: pick(parts.turned_boxes, order, Kind::TurnedBox),
-        cylinders: pick(parts.cylinders, order, Kind::Cylinder),
-        cones: pick(parts.cones, order, Kind::Cone),
     }
 }

@@ -1,10 +1,10 @@
 //! Leaves: eight rays against one primitive, or one ray after the other against eight.
 
 use super::line::Line;
-use super::node::Leaf;
+use super::node::{Beam, Leaf, Node};
 use super::stream::Exact;
 use crate::accel::Counts;
-use crate::lanes::{ExactPacket, Float8, LANES, Mask8, Ray, RayPacket, Vec3x8, bits, float8};
+use crate::lanes::{Columns, ExactPacket, Float8, LANES, Mask8, Ray, RayPacket, Vec3x8, bits, float8};
 use crate::scene::Visible;
 use crate::shapes::{Hidden8, Part, Ray64, RowRef, Store, Stores, Visit, noise};
 
@@ -15,7 +15,7 @@ pub struct PacketLeaf<'a, const ANY: bool, const CULL: bool> {
     /// `t_max` of a ray that has met something is the most that the exact place may be.
     pub packets: &'a mut [RayPacket],
     pub hits: &'a mut [Float8],
-    /// Where the hits are.
+    /// Where the hits are; with `ANY` the rows that the rays are known not to meet.
     pub places: &'a mut [Float8],
     /// The least that their exact places may be; without a hit the end of the ray.
     pub lows: &'a mut [Float8],
@@ -25,7 +25,33 @@ pub struct PacketLeaf<'a, const ANY: bool, const CULL: bool> {
     pub mask: u32,
     /// The origin, where all rays share it.
     pub common: Option<Vec3x8>,
+    /// Bounds of the packets, by which rows are passed over.
+    pub beams: Option<Beams<'a>>,
     pub counts: &'a mut Counts,
+}
+
+/// Bounds of some packets that go together.
+#[derive(Debug, Clone, Copy)]
+pub struct Beams<'a> {
+    /// A lane a packet.
+    pub each: &'a Beam,
+    /// All together.
+    pub whole: &'a Beam,
+    /// How far each of them still looks, and the greatest of these.
+    pub far: &'a Float8,
+    pub farthest: &'a Float8,
+}
+
+impl Beams<'_> {
+    /// Where some of them together may enter the boxes of a node at the earliest, and which they may meet.
+    #[inline(always)]
+    pub fn open(&self, node: &Node, members: u32) -> (Float8, Mask8) {
+        if members & (members - 1) == 0 {
+            let p = members.trailing_zeros() as usize;
+            return self.each.broadcast(p).meets_children(node, self.far.broadcast(p));
+        }
+        self.whole.meets_children(node, *self.farthest)
+    }
 }
 
 impl<const ANY: bool, const CULL: bool> Visit for PacketLeaf<'_, ANY, CULL> {
@@ -34,8 +60,6 @@ impl<const ANY: bool, const CULL: bool> Visit for PacketLeaf<'_, ANY, CULL> {
 
     #[inline(never)]
     fn visit<P: Part>(mut self, store: &Store<P>) -> u32 {
-        let Leaf { kind, count, .. } = self.leaf;
-        self.counts.kinds[kind as usize] += (count as u32 * self.mask.count_ones()) as u64 * LANES as u64;
         match (self.common, self.stores.certify()) {
             (Some(origin), true) => self.each_row::<P, true>(store, Some(&origin)),
             (Some(origin), false) => self.each_row::<P, false>(store, Some(&origin)),
@@ -49,17 +73,31 @@ impl<const ANY: bool, const CULL: bool> PacketLeaf<'_, ANY, CULL> {
     #[inline(always)]
     fn each_row<P: Part, const CERTIFY: bool>(&mut self, store: &Store<P>, common: Option<&Vec3x8>) -> u32 {
         let Leaf { kind, block, count } = self.leaf;
-        let mut touched = 0;
-        for lane in 0..count {
+        let (mut rows, mut touched) = ((1 << count) - 1, 0);
+        let mut node = Node::empty();
+        if let Some(beams) = &self.beams {
+            node = Node::around(P::bounds8(store.block(block)));
+            self.counts.boxes += LANES as u64;
+            rows &= beams.open(&node, self.mask).1.bits();
+        }
+        for lane in bits(rows) {
             let row = block * LANES + lane;
+            let mut packets = self.mask;
+            if let Some(beams) = &self.beams
+                && packets & (packets - 1) != 0
+            {
+                self.counts.boxes += LANES as u64;
+                packets &= beams.each.meets_child(&node, lane, *beams.far).1.bits();
+            }
+            self.counts.kinds[kind as usize] += u64::from(packets.count_ones()) * LANES as u64;
             let rows = store.splat(row);
             let part = |_| store.part(row);
             let hidden = if CULL { store.sides().lanes(|_| row) } else { Hidden8::NONE };
-            let once = common.map(|origin| P::anchor(&rows, origin, part));
-            for p in bits(self.mask) {
+            let once = common.map(|origin| P::anchor(&rows, origin));
+            for p in bits(packets) {
                 let rays = &mut self.packets[p];
-                let anchor = once.unwrap_or_else(|| P::anchor(&rows, &rays.origin, part));
-                let hit = P::hit::<CULL, CERTIFY>(&anchor, rays, &hidden);
+                let anchor = once.unwrap_or_else(|| P::anchor(&rows, &rays.origin));
+                let hit = P::hit::<CULL, CERTIFY>(&rows, &anchor, rays, &hidden, part);
                 let met = hit.mask | hit.doubt;
                 if !met.any() {
                     continue;
@@ -78,7 +116,10 @@ impl<const ANY: bool, const CULL: bool> PacketLeaf<'_, ANY, CULL> {
                     self.places[p] = clear.select(hit.t, self.places[p]);
                     self.hits[p] = clear.select(float8(RowRef::new(kind, row).to_lane()), self.hits[p]);
                 }
-                let open = met & !clear;
+                let mut open = met & !clear;
+                if ANY {
+                    open &= !Mask8::same_bits(self.places[p], float8(RowRef::new(kind, row).to_lane()));
+                }
                 if open.any() {
                     self.settle::<P, CERTIFY>(store, row, p, open, (hit.t, hit.mask));
                 }
@@ -174,8 +215,8 @@ impl<const ANY: bool, const CULL: bool> LineLeaf<'_, ANY, CULL> {
         for number in self.rays {
             let line = &mut self.lines[usize::from(*number)];
             let ray = line.splat();
-            let anchor = P::anchor(rows, &ray.origin, |lane| store.part(row(lane)));
-            let hit = P::hit::<CULL, CERTIFY>(&anchor, &ray, &hidden);
+            let anchor = P::anchor(rows, &ray.origin);
+            let hit = P::hit::<CULL, CERTIFY>(rows, &anchor, &ray, &hidden, |lane| store.part(row(lane)));
             let lanes = (hit.mask | hit.doubt).bits() & ((1 << count) - 1);
             if lanes == 0 {
                 continue;
@@ -190,7 +231,11 @@ impl<const ANY: bool, const CULL: bool> LineLeaf<'_, ANY, CULL> {
             }
             let (mask, sure) = (hit.mask.bits(), sure.bits());
             let (t, error, mut best) = (hit.t.as_array(), hit.error.as_array(), line.best());
+            let own = RowRef::from_lane(best.t);
             for lane in bits(lanes) {
+                if ANY && own == RowRef::new(kind, row(lane)) {
+                    continue;
+                }
                 let (low, high) = (t[lane] - error[lane], t[lane] + error[lane]);
                 let sure = sure >> lane & 1 == 1;
                 if sure && high < best.low {
@@ -219,7 +264,8 @@ impl<const ANY: bool, const CULL: bool> LineLeaf<'_, ANY, CULL> {
 pub struct Best {
     /// The row, or a miss.
     pub row: RowRef,
-    /// Its place: a function of ray and row alone, whatever else was met on the way.
+    /// Its place: a function of ray and row alone, whatever else was met on the way. Where any hit will do, the row
+    /// that the ray is known not to meet.
     pub t: f32,
     /// The least that the exact place may be; without a hit the end of the ray.
     pub low: f32,

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::lanes::{Columns, Float8, LANES, Mask8, UNIT_ROUNDOFF, float8};
+use crate::lanes::{Columns, Float8, LANES, Mask8, UNIT_ROUNDOFF, Vec3x8, float8};
 use crate::plan::Kind;
 
 /// Eight boxes and what they hold. An empty slot has an inverted box, which nothing meets.
@@ -17,6 +17,9 @@ pub struct Node {
 const CHILDREN: usize = 6;
 /// Column of the longest edges of their boxes.
 const SIZES: usize = 7;
+
+/// What bounds of rows that f32 computed are moved out by, as a share: rows round, and then their bounds do.
+const ROW_PAD: f32 = 16.0 * UNIT_ROUNDOFF;
 
 /// What a slot holds, in 32 bits.
 #[derive(Debug, Clone, Copy, Default)]
@@ -71,6 +74,7 @@ impl Child {
 
 impl Node {
     /// Eight empty slots.
+    #[inline(always)]
     pub fn empty() -> Self {
         let (low, high, zero) = (float8(f32::INFINITY), float8(f32::NEG_INFINITY), Float8::ZERO);
         Node { columns: [low, high, low, high, low, high, zero, zero] }
@@ -116,6 +120,14 @@ impl Node {
         };
         let boxes = (0..LANES).map(move |slot| (slot, corner(slot, 0), corner(slot, 1)));
         boxes.filter(|(_, min, max)| min.x <= max.x)
+    }
+
+    /// Boxes around eight rows; those of rows that hold nothing are NaN, which nothing meets.
+    #[inline(always)]
+    pub fn around((low, high): (Vec3x8, Vec3x8)) -> Self {
+        let pad = (low.abs() + high.abs()) * float8(ROW_PAD);
+        let (low, high, zero) = (low - pad, high + pad, Float8::ZERO);
+        Node { columns: [low.x, high.x, low.y, high.y, low.z, high.z, zero, zero] }
     }
 
     /// The planes of all boxes that are entered and left by on an axis, a lane a child.

@@ -1,12 +1,12 @@
 //! 64 rays down the tree: a lane is a packet, in leaves a ray.
 
 use super::bundle::Bundle;
-use super::leaf::{Best, PacketLeaf};
+use super::leaf::{Beams, Best, PacketLeaf};
 use super::node::{Beam, Child, Content, Leaf, Node, reach};
 use super::stack::{Entry, Stack};
 use super::stream::Stream;
 use super::{Counts, Tree, Walk};
-use crate::lanes::{Columns, ExactPacket, Float8, LANES, Mask8, Ray, RayPacket, Vec3x8, bits, float8, greatest};
+use crate::lanes::{ExactPacket, Float8, LANES, Mask8, Ray, RayPacket, Vec3x8, bits, float8, greatest};
 use crate::shapes::RowRef;
 
 /// Packets of a tile.
@@ -21,12 +21,16 @@ pub struct Tile {
     pub hits: [Float8; PACKETS],
     /// The origin, where all rays share it to the bit.
     pub common: Option<[f32; 3]>,
+    /// By ray that asks for any hit, the row that it begins or ends on, where that is known to lie behind it: from
+    /// outside no primitive is met twice. Bits of a [`RowRef`], a miss where nothing is known.
+    pub own: [Float8; PACKETS],
     /// The rays before they were rounded, where what f32 leaves open is to be decided by these and not by the numbers
     /// that their bits are.
     pub exact: Option<Box<[ExactPacket; PACKETS]>>,
     /// Room for these.
     spare: Option<Box<[ExactPacket; PACKETS]>>,
-    /// Where the hits are, and the least that their exact places may be; on the way `t_max` is the most.
+    /// Where the hits are, and the least that their exact places may be; on the way `t_max` is the most. Where any hit
+    /// will do, the rows of `own` stand for places.
     pub(super) places: [Float8; PACKETS],
     pub(super) lows: [Float8; PACKETS],
 }
@@ -74,7 +78,7 @@ impl Tile {
     pub fn new(packets: [RayPacket; PACKETS], common: Option<[f32; 3]>) -> Self {
         let none = [Float8::ZERO; PACKETS];
         let hits = [float8(RowRef::MISS.to_lane()); PACKETS];
-        Tile { packets, hits, common, exact: None, spare: None, places: none, lows: none }
+        Tile { packets, hits, common, own: hits, exact: None, spare: None, places: none, lows: none }
     }
 
     /// Dead rays.
@@ -92,6 +96,7 @@ impl Tile {
     /// Takes the tile for new rays, which have met nothing yet; its packets are still to be set.
     pub fn renew(&mut self, common: Option<[f32; 3]>) {
         self.hits = [float8(RowRef::MISS.to_lane()); PACKETS];
+        self.own = self.hits;
         self.common = common;
         self.spare = self.exact.take().or(self.spare.take());
     }
@@ -123,9 +128,11 @@ impl Tile {
     }
 
     /// Begins a walk: the ends of the rays are the places to beat.
-    fn begin(&mut self) {
-        self.places = std::array::from_fn(|p| self.packets[p].t_max);
-        self.lows = self.places;
+    fn begin<const ANY: bool>(&mut self) {
+        for p in 0..PACKETS {
+            self.lows[p] = self.packets[p].t_max;
+        }
+        self.places = if ANY { self.own } else { self.lows };
     }
 
     /// Ends it: `t_max` is the place of the hit.
@@ -167,7 +174,7 @@ impl Tree {
             walk.apart.clear();
             let mut parted = std::mem::take(&mut walk.parted);
             for (i, tile) in tiles.iter_mut().enumerate() {
-                tile.begin();
+                tile.begin::<ANY>();
                 let apart = self.walk_tile::<ANY, CULL>(tile, walk);
                 parted.extend(bits(apart).map(|p| (i as u32, p as u32)));
                 for p in bits(apart) {
@@ -194,7 +201,7 @@ impl Tree {
         let live_packets = |tile: &Tile| (0..PACKETS).map(|p| u32::from(tile.packets[p].live().any()) << p).sum();
         let mut all = live_packets(tile);
         for leaf in &self.loose {
-            tile.meet::<ANY, CULL>(self, *leaf, all, &mut walk.counts);
+            tile.meet::<ANY, CULL>(self, *leaf, all, None, &mut walk.counts);
         }
         if ANY && !self.loose.is_empty() {
             all = live_packets(tile);
@@ -222,7 +229,7 @@ impl Tree {
     /// Holds some packets against everything there is.
     fn meet_all<const ANY: bool, const CULL: bool>(&self, packets: u32, tile: &mut Tile, walk: &mut Walk) {
         for leaf in self.nodes.iter().flat_map(Node::leaves) {
-            tile.meet::<ANY, CULL>(self, leaf, packets, &mut walk.counts);
+            tile.meet::<ANY, CULL>(self, leaf, packets, None, &mut walk.counts);
         }
     }
 
@@ -258,6 +265,7 @@ impl Tile {
         tree: &Tree,
         leaf: Leaf,
         mask: u32,
+        beams: Option<Beams>,
         counts: &mut Counts,
     ) -> u32 {
         let stores = &tree.stores;
@@ -265,7 +273,8 @@ impl Tile {
         let common = self.common.map(Vec3x8::splat);
         let (places, lows) = (&mut self.places[..], &mut self.lows[..]);
         let exact = self.exact.as_ref().map(|exact| &exact[..]);
-        let work = PacketLeaf::<ANY, CULL> { stores, leaf, packets, hits, places, lows, exact, mask, common, counts };
+        let work =
+            PacketLeaf::<ANY, CULL> { stores, leaf, packets, hits, places, lows, exact, mask, common, beams, counts };
         stores.visit(leaf.kind, work)
     }
 }
@@ -281,12 +290,15 @@ impl<const ANY: bool, const CULL: bool> Packets<'_, ANY, CULL> {
             let mut nearest = None;
             match child.content() {
                 Content::Leaf(leaf) => {
-                    let touched = self.tile.meet::<ANY, CULL>(tree, leaf, members, counts);
+                    let Packets { tile, beam: each, whole, far, farthest, .. } = self;
+                    let beams = Beams { each, whole, far, farthest };
+                    let beams = Some(beams).filter(|_| leaf.count > 1);
+                    let touched = tile.meet::<ANY, CULL>(tree, leaf, members, beams, counts);
                     self.look_again(touched);
                 }
                 Content::Node(index) => {
                     counts.boxes += LANES as u64;
-                    let (entries, met) = self.open(&tree.nodes[index], members);
+                    let (entries, met) = self.beams().open(&tree.nodes[index], members);
                     let (node, members) = (index as u32, members as u8);
                     let waiting = |slot| Waiting { node, slot: slot as u8, members };
                     nearest = stack.nearest_first::<ANY>(&entries, met.bits(), waiting);
@@ -311,14 +323,9 @@ impl<const ANY: bool, const CULL: bool> Packets<'_, ANY, CULL> {
         }
     }
 
-    /// Where some of them together may enter the boxes of a node at the earliest, and which they may meet.
     #[inline(always)]
-    fn open(&self, node: &Node, members: u32) -> (Float8, Mask8) {
-        if members & (members - 1) == 0 {
-            let p = members.trailing_zeros() as usize;
-            return self.beam.broadcast(p).meets_children(node, self.far.broadcast(p));
-        }
-        self.whole.meets_children(node, self.farthest)
+    fn beams(&self) -> Beams<'_> {
+        Beams { each: &self.beam, whole: &self.whole, far: &self.far, farthest: &self.farthest }
     }
 
     /// Packets that at these places are wider than a box.
@@ -341,7 +348,7 @@ impl<const ANY: bool, const CULL: bool> Packets<'_, ANY, CULL> {
             }
             match child.content() {
                 Content::Leaf(leaf) if 2 * lanes.count_ones() > leaf.count as u32 => {
-                    touched |= self.tile.meet::<ANY, CULL>(self.tree, leaf, 1 << p, counts);
+                    touched |= self.tile.meet::<ANY, CULL>(self.tree, leaf, 1 << p, None, counts);
                 }
                 _ if lanes != 0 => {
                     self.own.stream.refresh(self.own.beams[p].1, lanes, self.tile, p);
@@ -371,7 +378,8 @@ impl<const ANY: bool, const CULL: bool> Packets<'_, ANY, CULL> {
                 true => f32::NEG_INFINITY,
                 false => greatest(reach(rays.t_max)),
             };
-            self.far.as_mut_array()[p] = limit;
+            // Not through memory, where a number that was just stored stalls the whole vector.
+            self.far = Mask8::from_bits(1 << p).select(float8(limit), self.far);
         }
         self.farthest = float8(greatest(self.far));
     }

@@ -51,7 +51,7 @@ impl Direct<'_> {
             sink.shadows.packets[p] = RayPacket::new(origin, dir, t_max, live);
         }
         let cast = lit;
-        self.settle(number, wave, hits.1, (&cast, &mut lit), sink);
+        self.settle(number, wave, hits, (&cast, &mut lit), sink);
         sink.add(hits.1, &radiance, &lit);
     }
 }

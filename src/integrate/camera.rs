@@ -77,19 +77,26 @@ impl CameraRays {
 
     /// Eight rays in f64.
     pub fn exact(&self, samples: &Samples8) -> ExactPacket {
-        self.exact_at(samples, &self.points(samples))
+        let mut rays = ExactPacket::default();
+        self.set_exact(samples, &self.points(samples), &mut rays);
+        rays
     }
 
-    /// Eight rays in f64, through the [points](CameraRays::points) of their samples.
-    pub fn exact_at(&self, samples: &Samples8, points: &[[f64; LANES]; 2]) -> ExactPacket {
-        let at = |base: &[DVec3; 3]| [affine(base, 0, points), affine(base, 1, points), affine(base, 2, points)];
-        let mut rays = ExactPacket { origin: at(&self.origin), dir: at(&self.dir) };
+    /// Sets eight rays in f64, through the [points](CameraRays::points) of their samples.
+    #[inline(always)]
+    pub fn set_exact(&self, samples: &Samples8, points: &[[f64; LANES]; 2], rays: &mut ExactPacket) {
+        for k in 0..3 {
+            match self.common {
+                Some(_) => rays.origin[k] = [self.origin[0][k]; LANES],
+                None => affine(&self.origin, k, points, &mut rays.origin[k]),
+            }
+            affine(&self.dir, k, points, &mut rays.dir[k]);
+        }
         match &self.optics {
             Optics::Straight => {}
             Optics::Lens(radii, focus) => rays.through_lens(samples, radii, *focus),
             Optics::Round(axes, turns) => rays.around(points, axes, *turns),
         }
-        rays
     }
 
     /// The same rounded to f32; lanes from `count` on are dead.
@@ -121,13 +128,11 @@ impl CameraRays {
 
 /// An axis of what changes by `base[1]` and `base[2]` a pixel right and down.
 #[inline(always)]
-fn affine(base: &[DVec3; 3], k: usize, points: &[[f64; LANES]; 2]) -> [f64; LANES] {
+fn affine(base: &[DVec3; 3], k: usize, points: &[[f64; LANES]; 2], axis: &mut [f64; LANES]) {
     let (start, right, down) = (base[0][k], base[1][k], base[2][k]);
-    let mut axis = [0.0; LANES];
     for lane in 0..LANES {
         axis[lane] = start + right * points[0][lane] + down * points[1][lane];
     }
-    axis
 }
 
 /// The sample patterns of one pixel.

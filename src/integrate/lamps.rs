@@ -140,7 +140,7 @@ impl Direct<'_> {
             }
         }
         if shadows {
-            self.settle(index, wave, hits.1, (&cast, &mut lit), sink);
+            self.settle(index, wave, hits, (&cast, &mut lit), sink);
         } else if R::ON {
             for (p, lit) in lit.into_iter().enumerate() {
                 bits(lit).for_each(|i| sink.record.lit(index, wave.slot(p, i), wave.path(p, i)));

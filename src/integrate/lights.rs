@@ -10,6 +10,7 @@ use crate::accel::PACKETS;
 use crate::lanes::{Float8, Mask8, RayPacket, UNIT_ROUNDOFF, Vec3x8, bits, float8};
 use crate::plan::{LEAST_COSINE, Skip};
 use crate::shade::{Illumination, Toward};
+use crate::shapes::RowRef;
 
 /// What one light gives to the hits of a wave.
 struct Shares {
@@ -97,7 +98,7 @@ impl Direct<'_> {
                 cast => hits.0[p].shadow_rays(light, Mask8::from_bits(cast)),
             };
         }
-        self.settle(index, wave, hits.1, (&shares.cast, &mut shares.lit), sink);
+        self.settle(index, wave, hits, (&shares.cast, &mut shares.lit), sink);
     }
 
     /// Traces the shadow rays of a light, and takes the lanes that lie in shadow out of `lit`.
@@ -105,11 +106,14 @@ impl Direct<'_> {
         &self,
         index: usize,
         wave: &Wave,
-        packets: u32,
+        (shaded, packets): Hits,
         (cast, lit): (&[u32; PACKETS], &mut [u32; PACKETS]),
         sink: &mut Sink<R>,
     ) {
         let tile = &mut *sink.shadows;
+        for p in bits(packets) {
+            tile.own[p] = left(wave.tile.hits[p], shaded[p].front);
+        }
         let told = R::ON.then_some(tile.packets);
         let redecided = sink.walk.counts.redecided;
         self.tree.occluded_tiles(from_mut(tile), sink.walk);
@@ -132,6 +136,17 @@ impl Direct<'_> {
             *lit &= bright | !cast;
         }
     }
+}
+
+/// The rows that shadow rays cannot meet: those they leave from, or end on, from outside. All of them are convex, and the
+/// rays stay clear of them by more than anything rounds by.
+#[inline(always)]
+fn left(rows: Float8, front: Mask8) -> Float8 {
+    let mut flat = 0;
+    for (lane, row) in rows.to_array().into_iter().enumerate() {
+        flat |= u32::from(RowRef::from_lane(row).is_flat()) << lane;
+    }
+    (front | Mask8::from_bits(flat)).select(rows, float8(RowRef::MISS.to_lane()))
 }
 
 /// Casts no rays from the fronts of primitives that nothing can put in the shadow of this light: from the inside of

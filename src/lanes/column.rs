@@ -12,7 +12,7 @@ pub trait Columns: Copy + Send + Sync {
     fn pack(rows: [Option<Self::One>; LANES]) -> Self;
     /// The row of one lane in all lanes.
     fn broadcast(&self, lane: usize) -> Self;
-    /// Lane `i` is lane `row(i).1` of block `row(i).0`. What of it nobody uses is not even read.
+    /// Lane `i` is lane `row(i).1` of block `row(i).0`.
     fn gather<'a>(row: impl Fn(usize) -> (&'a Self, usize) + Copy) -> Self
     where
         Self: 'a;
@@ -79,7 +79,9 @@ impl<C: Columns, const N: usize> Columns for [C; N] {
 
     #[inline(always)]
     fn broadcast(&self, lane: usize) -> Self {
-        std::array::from_fn(|k| self[k].broadcast(lane))
+        let mut all = *self;
+        all.iter_mut().for_each(|column| *column = column.broadcast(lane));
+        all
     }
 
     #[inline(always)]
@@ -87,7 +89,11 @@ impl<C: Columns, const N: usize> Columns for [C; N] {
     where
         Self: 'a,
     {
-        std::array::from_fn(|k| C::gather(|i| (&row(i).0[k], row(i).1)))
+        let mut all = *row(0).0;
+        for (k, column) in all.iter_mut().enumerate() {
+            *column = C::gather(|i| (&row(i).0[k], row(i).1));
+        }
+        all
     }
 }
 

@@ -2,6 +2,9 @@
 
 use std::ops::{BitAnd, BitAndAssign, BitOr, BitOrAssign, Not};
 
+use bytemuck::cast;
+use wide::i32x8;
+
 use super::{Float8, LANES};
 
 /// Eight yes-or-no lanes. A comparison with NaN is no.
@@ -13,9 +16,10 @@ impl Mask8 {
     pub const NONE: Mask8 = Mask8(Float8::new([0.0; LANES]));
 
     /// Lane `i` is bit `i`.
+    #[inline(always)]
     pub fn from_bits(bits: u32) -> Self {
-        let lane = |i| if bits >> i & 1 == 1 { f32::from_bits(u32::MAX) } else { 0.0 };
-        Mask8(Float8::new(std::array::from_fn(lane)))
+        let own = i32x8::new([1, 2, 4, 8, 16, 32, 64, 128]);
+        Mask8(cast((i32x8::splat(bits as i32) & own).simd_eq(own)))
     }
 
     /// Bit `i` is lane `i`.
@@ -70,6 +74,13 @@ impl Mask8 {
     #[inline(always)]
     pub fn ge(a: Float8, b: Float8) -> Self {
         Mask8(a.simd_ge(b))
+    }
+
+    /// Lanes with the same bits, whatever number those are.
+    #[inline(always)]
+    pub fn same_bits(a: Float8, b: Float8) -> Self {
+        let (a, b): (i32x8, i32x8) = (cast(a), cast(b));
+        Mask8(cast(a.simd_eq(b)))
     }
 
     /// Lanes whose sign bit is set, -0 and negative NaN among them.

@@ -19,6 +19,12 @@ impl Vec3x8 {
     /// Zero in all lanes.
     pub const ZERO: Vec3x8 = Vec3x8::new(Float8::ZERO, Float8::ZERO, Float8::ZERO);
 
+    /// The same number throughout.
+    pub const fn constant(x: f32) -> Self {
+        let lanes = Float8::new([x; LANES]);
+        Vec3x8::new(lanes, lanes, lanes)
+    }
+
     /// From three columns.
     #[inline(always)]
     pub const fn new(x: Float8, y: Float8, z: Float8) -> Self {
@@ -110,6 +116,18 @@ impl Vec3x8 {
     #[inline(always)]
     pub fn abs(self) -> Vec3x8 {
         Vec3x8::new(self.x.abs(), self.y.abs(), self.z.abs())
+    }
+
+    /// The lesser of each coordinate; neither may be NaN.
+    #[inline(always)]
+    pub fn min(self, other: Vec3x8) -> Vec3x8 {
+        Vec3x8::new(self.x.fast_min(other.x), self.y.fast_min(other.y), self.z.fast_min(other.z))
+    }
+
+    /// The greater of each coordinate; neither may be NaN.
+    #[inline(always)]
+    pub fn max(self, other: Vec3x8) -> Vec3x8 {
+        Vec3x8::new(self.x.fast_max(other.x), self.y.fast_max(other.y), self.z.fast_max(other.z))
     }
 
     /// Sum of the coordinates: of absolute values the 1-norm.

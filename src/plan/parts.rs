@@ -47,6 +47,15 @@ impl Kind {
         Kind::Cone,
     ];
 
+    /// The kind whose rows hold parts of both kinds, if there is one: of two kinds of polygons the one of more corners.
+    pub fn holding(self, other: Kind) -> Option<Kind> {
+        let polygons = [Kind::Triangle, Kind::Quad, Kind::Octagon];
+        match self == other || (polygons.contains(&self) && polygons.contains(&other)) {
+            true => Some(self.max(other)),
+            false => None,
+        }
+    }
+
     /// The word for it in statistics.
     pub fn name(self) -> &'static str {
         match self {
@@ -181,6 +190,14 @@ pub struct ConePart {
     pub apex_radius: f64,
     /// Whose it is.
     pub owner: Owner,
+}
+
+impl<const N: usize> PolygonPart<N> {
+    /// The same polygon among those of up to `M` corners, which are no fewer.
+    pub fn with_corners<const M: usize>(&self) -> PolygonPart<M> {
+        let PolygonPart { corners, normal, uv_origin, uv_edge, owner } = *self;
+        PolygonPart { corners: std::array::from_fn(|k| corners[k.min(N - 1)]), normal, uv_origin, uv_edge, owner }
+    }
 }
 
 impl TurnedBoxPart {

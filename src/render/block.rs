@@ -333,7 +333,7 @@ impl Batch {
                 self.distances[p] = samples.distances(&points);
             }
             let exact = &mut wave.tile.exact_mut()[p];
-            *exact = rays.exact_at(samples, &points);
+            rays.set_exact(samples, &points, exact);
             if keep_exact {
                 wave.exact[p] = *exact;
             }

@@ -79,15 +79,14 @@ impl MaterialTable {
             *bsdf = Bsdf8::splat(&self.0[materials[0] as usize]);
             return;
         }
-        let rows = materials.map(|material| &self.0[material as usize]);
-        let column = |f: fn(&Row) -> f32| Float8::from(rows.map(f));
-        *bsdf = Bsdf8 {
-            color: Vec3x8::from_fn(|i| rows[i].color),
-            diffuse: column(|row| row.diffuse),
-            specular: column(|row| row.specular),
-            shine: column(|row| row.shine),
-            lit: column(Row::lit),
-        };
+        for (i, material) in materials.into_iter().enumerate() {
+            let row = &self.0[material as usize];
+            bsdf.color.set_lane(i, row.color);
+            bsdf.diffuse.as_mut_array()[i] = row.diffuse;
+            bsdf.specular.as_mut_array()[i] = row.specular;
+            bsdf.shine.as_mut_array()[i] = row.shine;
+            bsdf.lit.as_mut_array()[i] = row.lit();
+        }
     }
 
     /// How rays go on from a material.

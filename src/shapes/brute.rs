@@ -78,11 +78,12 @@ fn decided<P: Part>(
     cull: bool,
     row: impl Fn(usize) -> usize,
 ) -> [Option<f32>; LANES] {
-    let anchor = P::anchor(rows, &rays.origin, |lane| store.part(row(lane)));
+    let part = |lane| store.part(row(lane));
+    let anchor = P::anchor(rows, &rays.origin);
     let hidden = store.sides().lanes(&row);
     let Hit8 { t, mask, doubt, .. } = match cull {
-        true => P::hit::<true, true>(&anchor, rays, &hidden),
-        false => P::hit::<false, true>(&anchor, rays, &Hidden8::NONE),
+        true => P::hit::<true, true>(rows, &anchor, rays, &hidden, part),
+        false => P::hit::<false, true>(rows, &anchor, rays, &Hidden8::NONE, part),
     };
     let lane = |lane: usize| {
         let (place, bits) = (t.to_array()[lane], rays.lane(lane));

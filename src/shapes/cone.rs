@@ -3,6 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::cylinder::{about_axis, ends_missed, of_mantle};
+use super::disk::round_bounds;
 use super::sphere::copysign;
 use super::{Hidden8, Part, Ray64, Surface8, Surface64, VANISHED, VANISHING, roundings};
 use crate::lanes::{Float8, Hit8, Mask8, RayPacket, Vec3x8, difference_of_products, float8};
@@ -23,6 +24,7 @@ pub struct Anchor {
 impl Part for ConePart {
     /// Centre of the narrower end and the unit axis from there, height, radius there and growth per unit of height.
     type Rows = ([Vec3x8; 2], [Float8; 3]);
+    type Face = Self::Rows;
     type Anchor = Anchor;
 
     fn row(&self) -> ([DVec3; 2], [f64; 3]) {
@@ -31,7 +33,15 @@ impl Part for ConePart {
     }
 
     #[inline(always)]
-    fn anchor<'a>(rows: &Self::Rows, origin: &Vec3x8, _: impl Fn(usize) -> Option<&'a Self>) -> Anchor {
+    fn bounds8(([tip, axis], [height, radius, slope]): &Self::Rows) -> (Vec3x8, Vec3x8) {
+        let (low, high) = round_bounds(*tip, *axis, *radius);
+        let wide = height.mul_add(*slope, *radius);
+        let (other_low, other_high) = round_bounds(axis.mul_add(*height, *tip), *axis, wide);
+        (low.min(other_low), high.max(other_high))
+    }
+
+    #[inline(always)]
+    fn anchor(rows: &Self::Rows, origin: &Vec3x8) -> Anchor {
         let ([tip, axis], [height, radius, slope]) = *rows;
         let f = tip - *origin;
         let error = roundings(4.0).mul_add((tip.abs() + f.abs()).sum(), float8(VANISHING));
@@ -43,7 +53,13 @@ impl Part for ConePart {
     /// quotient and product. Heights outside 0..height drop the mirror cone as well. Along the way the
     /// sign of `A t + B` says which side of the mantle a root meets.
     #[inline(always)]
-    fn hit<const CULL: bool, const CERTIFY: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
+    fn hit<'a, const CULL: bool, const CERTIFY: bool>(
+        _: &Self::Rows,
+        anchor: &Anchor,
+        rays: &RayPacket,
+        hidden: &Hidden8,
+        _: impl Fn(usize) -> Option<&'a Self>,
+    ) -> Hit8 {
         let Anchor { f, error, axis, height, radius, slope } = *anchor;
         let p = f.dot(rays.dir) * rays.inv_dd;
         let g = rays.dir.mul_add(p, -f); // from the tip to the nearest point
@@ -149,6 +165,11 @@ impl Part for ConePart {
         let normal = (radial.unwrap_or(-axis) - axis * self.growth()).normalize();
         let rho = (self.narrow_radius() + self.growth() * w).max(0.0);
         Surface64 { t, point: tip + axis * w + radial.unwrap_or_default() * rho, normal }
+    }
+
+    #[inline(always)]
+    fn face(rows: &Self::Rows) -> &Self::Rows {
+        rows
     }
 
     fn surface(rows: &Self::Rows, rays: &RayPacket, t: Float8) -> Surface8 {

@@ -18,6 +18,7 @@ pub struct Anchor {
 impl Part for BoxPart {
     /// Lower and upper corner.
     type Rows = [Vec3x8; 2];
+    type Face = Self::Rows;
     type Anchor = Anchor;
 
     fn row(&self) -> [DVec3; 2] {
@@ -25,7 +26,12 @@ impl Part for BoxPart {
     }
 
     #[inline(always)]
-    fn anchor<'a>(rows: &Self::Rows, origin: &Vec3x8, _: impl Fn(usize) -> Option<&'a Self>) -> Anchor {
+    fn bounds8(rows: &Self::Rows) -> (Vec3x8, Vec3x8) {
+        (rows[0], rows[1])
+    }
+
+    #[inline(always)]
+    fn anchor(rows: &Self::Rows, origin: &Vec3x8) -> Anchor {
         let (min, max) = (rows[0] - *origin, rows[1] - *origin);
         // Corners round with the scene, the difference once; a quotient three times, the direction's rounding included.
         let corner = (rows[0].abs() + rows[1].abs()) * roundings(2.5);
@@ -33,7 +39,13 @@ impl Part for BoxPart {
     }
 
     #[inline(always)]
-    fn hit<const CULL: bool, const CERTIFY: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
+    fn hit<'a, const CULL: bool, const CERTIFY: bool>(
+        _: &Self::Rows,
+        anchor: &Anchor,
+        rays: &RayPacket,
+        hidden: &Hidden8,
+        _: impl Fn(usize) -> Option<&'a Self>,
+    ) -> Hit8 {
         let Anchor { min, max, error } = *anchor;
         Stretch::new::<CERTIFY>(min, max, error, rays.dir, Float8::ZERO).first_of::<CULL, CERTIFY>(hidden, rays)
     }
@@ -52,8 +64,13 @@ impl Part for BoxPart {
     }
 
     #[inline(always)]
+    fn face(rows: &Self::Rows) -> &Self::Rows {
+        rows
+    }
+
+    #[inline(always)]
     fn surface(rows: &[Vec3x8; 2], rays: &RayPacket, t: Float8) -> Surface8 {
-        let Anchor { min, max, error } = Self::anchor(rows, &rays.origin, |_| None);
+        let Anchor { min, max, error } = Self::anchor(rows, &rays.origin);
         let face = Face::at(t, [min, max, error], rays.dir, Float8::ZERO);
         let [min, max] = *rows;
         let (point, normal) = face.put(min, max, rays.dir.mul_add(t, rays.origin));

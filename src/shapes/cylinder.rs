@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 
+use super::disk::round_bounds;
 use super::sphere::copysign;
 use super::{Hidden8, Part, Ray64, Surface8, Surface64, VANISHING, nearer, roundings};
 use crate::lanes::{Float8, Hit8, Mask8, RayPacket, UNIT_ROUNDOFF, Vec3x8, float8};
@@ -24,6 +25,7 @@ pub struct Anchor {
 impl Part for CylinderPart {
     /// Base and unit axis, height and radius.
     type Rows = ([Vec3x8; 2], [Float8; 2]);
+    type Face = Self::Rows;
     type Anchor = Anchor;
 
     fn row(&self) -> ([DVec3; 2], [f64; 2]) {
@@ -31,7 +33,14 @@ impl Part for CylinderPart {
     }
 
     #[inline(always)]
-    fn anchor<'a>(rows: &Self::Rows, origin: &Vec3x8, _: impl Fn(usize) -> Option<&'a Self>) -> Anchor {
+    fn bounds8(([base, axis], [height, radius]): &Self::Rows) -> (Vec3x8, Vec3x8) {
+        let (low, high) = round_bounds(*base, *axis, *radius);
+        let (other_low, other_high) = round_bounds(axis.mul_add(*height, *base), *axis, *radius);
+        (low.min(other_low), high.max(other_high))
+    }
+
+    #[inline(always)]
+    fn anchor(rows: &Self::Rows, origin: &Vec3x8) -> Anchor {
         let ([base, axis], [height, radius]) = *rows;
         let f = base - *origin;
         let error = roundings(6.0).mul_add((base.abs() + f.abs()).sum() + height, float8(VANISHING));
@@ -44,7 +53,13 @@ impl Part for CylinderPart {
     ///
     /// Source: after Haines, Günther and Akenine-Möller, Ray Tracing Gems, 2019, chapter 7.
     #[inline(always)]
-    fn hit<const CULL: bool, const CERTIFY: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
+    fn hit<'a, const CULL: bool, const CERTIFY: bool>(
+        _: &Self::Rows,
+        anchor: &Anchor,
+        rays: &RayPacket,
+        hidden: &Hidden8,
+        _: impl Fn(usize) -> Option<&'a Self>,
+    ) -> Hit8 {
         let Anchor { f, axis, height, r2, error, slip } = *anchor;
         let p = f.dot(rays.dir) * rays.inv_dd;
         let q = rays.dir.mul_add(-p, f);
@@ -130,6 +145,11 @@ impl Part for CylinderPart {
         let w = from_base.dot(self.axis);
         let normal = (from_base - self.axis * w).normalize();
         Surface64 { t, point: self.base + self.axis * w + normal * self.radius, normal }
+    }
+
+    #[inline(always)]
+    fn face(rows: &Self::Rows) -> &Self::Rows {
+        rows
     }
 
     fn surface(rows: &Self::Rows, rays: &RayPacket, t: Float8) -> Surface8 {

@@ -26,6 +26,7 @@ pub struct Anchor {
 impl Part for DiskPart {
     /// Center and unit normal, radius and inner radius.
     type Rows = ([Vec3x8; 2], [Float8; 2]);
+    type Face = [Vec3x8; 2];
     type Anchor = Anchor;
 
     fn row(&self) -> ([DVec3; 2], [f64; 2]) {
@@ -33,7 +34,12 @@ impl Part for DiskPart {
     }
 
     #[inline(always)]
-    fn anchor<'a>(rows: &Self::Rows, origin: &Vec3x8, _: impl Fn(usize) -> Option<&'a Self>) -> Anchor {
+    fn bounds8(([center, normal], [radius, _]): &Self::Rows) -> (Vec3x8, Vec3x8) {
+        round_bounds(*center, *normal, *radius)
+    }
+
+    #[inline(always)]
+    fn anchor(rows: &Self::Rows, origin: &Vec3x8) -> Anchor {
         let ([center, normal], [radius, inner]) = *rows;
         let f = center - *origin;
         let reach = (center.abs() + f.abs()).sum();
@@ -43,7 +49,13 @@ impl Part for DiskPart {
     /// The plane of equation (6), then (7) and (8) of the paper with the vector from the centre formed as
     /// `t dir - f`, so that nothing large cancels: Kucherov, Morgun and Golenkovskaya, 2016, section IV B.
     #[inline(always)]
-    fn hit<const CULL: bool, const CERTIFY: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
+    fn hit<'a, const CULL: bool, const CERTIFY: bool>(
+        _: &Self::Rows,
+        anchor: &Anchor,
+        rays: &RayPacket,
+        hidden: &Hidden8,
+        _: impl Fn(usize) -> Option<&'a Self>,
+    ) -> Hit8 {
         let nd = anchor.normal.dot(rays.dir);
         let length = rays.dir.abs().sum(); // no shorter than the direction
         let crossing = Crossing::new::<CERTIFY>(anchor.height, anchor.error, nd, length);
@@ -66,7 +78,11 @@ impl Part for DiskPart {
                 Mask8::le((rho2 - r * r).abs(), shift * (r + r + shift) * Float8::splat(1.25))
             };
             let hole = Mask8::gt(anchor.inner, Float8::ZERO);
-            doubt = on_ray & (near_rim(anchor.radius) | (near_rim(anchor.inner) & hole));
+            doubt = near_rim(anchor.radius);
+            if hole.any() {
+                doubt |= near_rim(anchor.inner) & hole;
+            }
+            doubt &= on_ray;
             // Beside the plane nothing is known; past the start it is open only what may be inside.
             open &= inside | doubt | crossing.beside;
             doubt |= open;
@@ -91,7 +107,12 @@ impl Part for DiskPart {
     }
 
     #[inline(always)]
-    fn surface(([center, normal], _): &Self::Rows, rays: &RayPacket, t: Float8) -> Surface8 {
+    fn face((face, _): &Self::Rows) -> &[Vec3x8; 2] {
+        face
+    }
+
+    #[inline(always)]
+    fn surface([center, normal]: &Self::Face, rays: &RayPacket, t: Float8) -> Surface8 {
         flat_surface(*center, *normal, rays, t)
     }
 
@@ -113,4 +134,12 @@ impl Part for DiskPart {
     fn owner(&self) -> Owner {
         self.owner
     }
+}
+
+/// Bounds of eight disks: half their size along an axis is that of the normal across it.
+#[inline(always)]
+pub(super) fn round_bounds(center: Vec3x8, normal: Vec3x8, radius: Float8) -> (Vec3x8, Vec3x8) {
+    let n2 = normal.scale(normal);
+    let half = Vec3x8::new((n2.y + n2.z).sqrt(), (n2.z + n2.x).sqrt(), (n2.x + n2.y).sqrt()) * radius;
+    (center - half, center + half)
 }

@@ -34,24 +34,37 @@ use crate::scene::Visible;
 pub trait Part: Clone + Send + Sync {
     /// Eight parts as kernels see them.
     type Rows: Columns;
+    /// What of them tells where the surface is and which way it looks.
+    type Face: Columns;
     /// What depends on the origin of a ray and the primitive alone.
     type Anchor: Copy;
 
     /// The numbers of one part, to be rounded.
     fn row(&self) -> <Self::Rows as Columns>::One;
-    /// What the kernel needs of these rows for rays from `origin`; `part` tells what a lane of `rows` stands for.
-    fn anchor<'a>(rows: &Self::Rows, origin: &Vec3x8, part: impl Fn(usize) -> Option<&'a Self>) -> Self::Anchor
+    /// Bounds, lower and upper corner, as good as f32 is.
+    fn bounds8(rows: &Self::Rows) -> (Vec3x8, Vec3x8);
+    /// What the kernel needs of these rows for rays from `origin`.
+    fn anchor(rows: &Self::Rows, origin: &Vec3x8) -> Self::Anchor;
+    /// First hit with `t_min < t <= t_max`; with `CULL` hidden sides are not met. With `CERTIFY` it says what f32
+    /// cannot tell: the error of `t`, which hits within that of the end of the ray are told of too, and doubts. `part`
+    /// tells what a lane of `rows` stands for.
+    fn hit<'a, const CULL: bool, const CERTIFY: bool>(
+        rows: &Self::Rows,
+        anchor: &Self::Anchor,
+        rays: &RayPacket,
+        hidden: &Hidden8,
+        part: impl Fn(usize) -> Option<&'a Self>,
+    ) -> Hit8
     where
         Self: 'a;
-    /// First hit with `t_min < t <= t_max`; with `CULL` hidden sides are not met. With `CERTIFY` it says what f32
-    /// cannot tell: the error of `t`, which hits within that of the end of the ray are told of too, and doubts.
-    fn hit<const CULL: bool, const CERTIFY: bool>(anchor: &Self::Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8;
     /// The f64 answer where the kernel is in doubt: touching counts as a hit.
     fn decide(&self, ray: &Ray64, visible: Visible) -> Option<f64>;
     /// The hit near `t` again, in f64; of two that f32 cannot tell apart the first one of a side that is seen.
     fn refine(&self, ray: &Ray64, t: f64, visible: Visible) -> Surface64;
+    /// What of them tells where the surface is.
+    fn face(rows: &Self::Rows) -> &Self::Face;
     /// Where the rays are at `t`, put on the surface.
-    fn surface(rows: &Self::Rows, rays: &RayPacket, t: Float8) -> Surface8;
+    fn surface(face: &Self::Face, rays: &RayPacket, t: Float8) -> Surface8;
     /// Texture coordinates of a point on the part.
     fn uv(&self, point: DVec3) -> DVec2;
     /// Bounds: lower and upper corner.

@@ -18,13 +18,18 @@ pub struct Anchor {
 impl Part for PlanePart {
     /// A point and the unit normal.
     type Rows = [Vec3x8; 2];
+    type Face = Self::Rows;
     type Anchor = Anchor;
 
     fn row(&self) -> [DVec3; 2] {
         [self.point, self.normal]
     }
 
-    fn anchor<'a>(rows: &Self::Rows, origin: &Vec3x8, _: impl Fn(usize) -> Option<&'a Self>) -> Anchor {
+    fn bounds8(_: &Self::Rows) -> (Vec3x8, Vec3x8) {
+        EVERYWHERE
+    }
+
+    fn anchor(rows: &Self::Rows, origin: &Vec3x8) -> Anchor {
         let [point, normal] = *rows;
         let f = point - *origin;
         Anchor { height: normal.dot(f), error: height_error(normal, point, f), normal }
@@ -36,7 +41,13 @@ impl Part for PlanePart {
     /// Source: Kucherov, Morgun and Golenkovskaya, "A visualization of 3D images by back ray tracing:
     /// the geometric approach", 2016, section IV A.
     #[inline(always)]
-    fn hit<const CULL: bool, const CERTIFY: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
+    fn hit<'a, const CULL: bool, const CERTIFY: bool>(
+        _: &Self::Rows,
+        anchor: &Anchor,
+        rays: &RayPacket,
+        hidden: &Hidden8,
+        _: impl Fn(usize) -> Option<&'a Self>,
+    ) -> Hit8 {
         let nd = anchor.normal.dot(rays.dir);
         let crossing = Crossing::new::<CERTIFY>(anchor.height, anchor.error, nd, rays.dir.abs().sum());
         let (mut mask, doubt) = crossing.on::<CERTIFY>(rays);
@@ -54,6 +65,11 @@ impl Part for PlanePart {
 
     fn refine(&self, ray: &Ray64, _: f64, _: Visible) -> Surface64 {
         flat_surface64(self.point, self.normal, ray)
+    }
+
+    #[inline(always)]
+    fn face(rows: &Self::Rows) -> &Self::Rows {
+        rows
     }
 
     #[inline(always)]
@@ -80,6 +96,9 @@ impl Part for PlanePart {
     }
 }
 
+/// The bounds of planes.
+const EVERYWHERE: (Vec3x8, Vec3x8) = (Vec3x8::constant(f32::NEG_INFINITY), Vec3x8::constant(f32::INFINITY));
+
 /// The error of `n . f`, where f goes from the ray's origin to `anchor`: the anchor rounds with the scene, f with the
 /// subtraction, the normal and the products each once, the sum three times.
 #[inline(always)]
@@ -93,6 +112,8 @@ pub(super) fn height_error(normal: Vec3x8, anchor: Vec3x8, f: Vec3x8) -> Float8 
 pub(super) struct Crossing {
     pub t: Float8,
     pub error: Float8,
+    /// `1 / n . dir`.
+    pub inv: Float8,
     /// Lanes in which the ray may as well run beside the plane: nothing is known of `t` there.
     pub beside: Mask8,
 }
@@ -104,13 +125,13 @@ impl Crossing {
         let inv = float8(1.0) / nd;
         let t = height * inv;
         if !CERTIFY {
-            return Crossing { t, error: Float8::ZERO, beside: Mask8::NONE };
+            return Crossing { t, error: Float8::ZERO, inv, beside: Mask8::NONE };
         }
         let slip = roundings(6.0) * dir;
         // Where slip is a quarter of n . dir at most, 4/3 stands for what is of second order.
         let first = t.abs().mul_add(slip, error) * (inv.abs() * float8(4.0 / 3.0));
         let error = t.abs().mul_add(roundings(2.0), first);
-        Crossing { t, error, beside: Mask8::le(nd.abs(), slip * float8(4.0)) }
+        Crossing { t, error, inv, beside: Mask8::le(nd.abs(), slip * float8(4.0)) }
     }
 
     /// Lanes that may be met, and among them those in which that is open.

@@ -1,7 +1,8 @@
-//! Convex polygons of up to `N` corners; shorter ones, which have more than four, repeat their last corner.
+//! Convex polygons of up to `N` corners; shorter ones repeat their last corner.
 
 use glam::{DVec2, DVec3};
 
+use super::disk::round_bounds;
 use super::plane::{Crossing, flat_surface, flat_surface64, height_error, shows, side_hidden};
 use super::{Hidden8, Part, Ray64, Surface8, Surface64, VANISHED, roundings};
 use crate::lanes::{Float8, Hit8, Mask8, RayPacket, Vec3x8, float8};
@@ -10,82 +11,104 @@ use crate::scene::Visible;
 
 /// Eight rows seen from eight origins.
 #[derive(Debug, Clone, Copy)]
-pub struct Anchor<const N: usize> {
-    height: Float8, // n . (first corner - origin)
+pub struct Anchor {
+    f: Vec3x8,      // from the origin to the center
+    height: Float8, // n . f
     error: Float8,  // of the height
-    normal: Vec3x8,
-    edges: [Vec3x8; N], // a x (b - a) for each edge ab seen from the origin
-    bound: Float8,      // error of dir . edge for |dir|_1 = 1, the rounding of the scene included
+    slip: Float8,   // of places beside the center, the error of t apart
 }
 
 impl<const N: usize> Part for PolygonPart<N> {
-    /// The unit normal of the whole polygon that this is a part of, and the corners.
-    type Rows = (Vec3x8, [Vec3x8; N]);
-    type Anchor = Anchor<N>;
+    /// A center in the plane and the unit normal; the radius about the center, how far corners lie beside the plane, and
+    /// the axis that edges are seen along (0, 1, 2); by edge the unit vector across it, inward, on the other two axes,
+    /// and how far from the center the edge lies along that.
+    type Rows = (([Vec3x8; 2], [Float8; 3]), [[Float8; 3]; N]);
+    type Face = [Vec3x8; 2];
+    type Anchor = Anchor;
 
-    fn row(&self) -> (DVec3, [DVec3; N]) {
-        (self.normal, self.corners)
-    }
-
-    #[inline(always)]
-    fn anchor<'a>(rows: &Self::Rows, origin: &Vec3x8, _: impl Fn(usize) -> Option<&'a Self>) -> Anchor<N> {
-        let (normal, corners) = rows;
-        let mut edges = [Vec3x8::ZERO; N];
-        let (mut reach, mut size) = (Float8::ZERO, Float8::ZERO);
-        for k in 0..N {
-            let (a, side) = (corners[k] - *origin, corners[(k + 1) % N] - corners[k]);
-            let length = side.abs().sum();
-            edges[k] = a.cross(side);
-            // A corner that is repeated has an edge of no length, which says nothing: another one stands in for it.
-            if (4..N - 1).contains(&k) {
-                edges[k] = Vec3x8::select(Mask8::le(length, Float8::ZERO), edges[k - 1], edges[k]);
+    fn row(&self) -> (([DVec3; 2], [f64; 3]), [[f64; 3]; N]) {
+        let (first, normal) = (self.corners[0], self.normal);
+        let greatest = |of: &dyn Fn(DVec3) -> f64| self.corners.iter().map(|corner| of(*corner)).fold(0.0, f64::max);
+        let warp = greatest(&|corner| normal.dot(corner - first).abs());
+        let (low, high) = self.bounds();
+        let middle = low.midpoint(high);
+        let center = middle + normal * normal.dot(first - middle);
+        let radius = greatest(&|corner| corner.distance(center));
+        let axis = normal.abs().max_position();
+        let seen = |corner: DVec3| match axis {
+            0 => DVec2::new(corner.y, corner.z),
+            1 => DVec2::new(corner.x, corner.z),
+            _ => DVec2::new(corner.x, corner.y),
+        };
+        // Corners go around the other way where the axis is the second one, or the normal goes against it.
+        let turn = if (axis == 1) == (normal[axis] > 0.0) { -1.0 } else { 1.0 };
+        let edge = |k: usize| {
+            let (a, b) = (self.corners[k], self.corners[(k + 1) % N]);
+            match (turn * seen(b - a).perp()).try_normalize() {
+                Some(inward) => [inward.x, inward.y, inward.dot(seen(a - center))],
+                None => [0.0, 0.0, f64::NEG_INFINITY], // of a corner that is repeated: all is inside
             }
-            reach = reach.fast_max(a.abs().sum() + corners[k].abs().sum());
-            size = size.fast_max(length);
-        }
-        // Corners round with the scene, a with the subtraction: each moves an edge by two of its roundings, and turns
-        // it by as much over the widest way across, of which two edges make one of four corners, four one of eight.
-        // Products, sum and direction round six times.
-        let bound = (roundings(if N > 4 { 18.0 } else { 12.0 }) * reach).mul_add(size, float8(VANISHED));
-        let first = corners[0] - *origin;
-        let error = height_error(*normal, corners[0], first);
-        Anchor { height: normal.dot(first), error, normal: *normal, edges, bound }
+        };
+        (([center, normal], [radius, warp, axis as f64]), std::array::from_fn(edge))
     }
 
-    /// The ray passes each edge ab on the same side: the sign of `dir . (a x b)`, with a and b seen from
-    /// the origin, as `a x (b - a)`, which loses nothing for small polygons far away. `t` comes from the
-    /// plane. Lanes that pass an edge more closely than the bound are decided in f64, where touching
-    /// counts, so no ray slips between two polygons that share an edge.
-    ///
-    /// Source: equation (10) of Kucherov, Morgun and Golenkovskaya, 2016, section IV C, with the origin
-    /// moved to the ray's, without which it depends on where the scene lies.
     #[inline(always)]
-    fn hit<const CULL: bool, const CERTIFY: bool>(anchor: &Anchor<N>, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
-        let nd = anchor.normal.dot(rays.dir);
-        // Seen from the front the edge products are negative; the sign of n . dir makes them positive.
-        let flip = Mask8::sign(nd);
-        let mut least = Float8::splat(f32::INFINITY);
-        for edge in &anchor.edges {
-            let e = edge.dot(rays.dir);
-            least = least.fast_min(flip.select(-e, e));
-        }
+    fn bounds8((([center, normal], [radius, ..]), _): &Self::Rows) -> (Vec3x8, Vec3x8) {
+        round_bounds(*center, *normal, *radius)
+    }
+
+    #[inline(always)]
+    fn anchor(((rows, _), _): &Self::Rows, origin: &Vec3x8) -> Anchor {
+        let [center, normal] = *rows;
+        let f = center - *origin;
+        // The center rounds with the scene, f and t dir with every operation, where t dir is as long as f and the way
+        // from the center together.
+        let slip = roundings(6.0).mul_add(f.abs().sum(), roundings(3.0).mul_add(center.abs().sum(), float8(VANISHED)));
+        Anchor { f, height: normal.dot(f), error: height_error(normal, center, f), slip }
+    }
+
+    /// `t` comes from the plane, as in equation (6) of the paper; the point there, seen from the center so that
+    /// nothing large cancels, is held against each edge on the two axes across which the polygon is widest. Lanes that
+    /// pass an edge more closely than the bound are decided in f64, where touching counts, so no ray slips between two
+    /// polygons that share an edge.
+    ///
+    /// Source: Kucherov, Morgun and Golenkovskaya, 2016, section IV; the axes as in Badouel, "An efficient ray-polygon
+    /// intersection", Graphics Gems, 1990.
+    #[inline(always)]
+    fn hit<'a, const CULL: bool, const CERTIFY: bool>(
+        ((rows, [_, warp, axis]), edges): &Self::Rows,
+        anchor: &Anchor,
+        rays: &RayPacket,
+        hidden: &Hidden8,
+        _: impl Fn(usize) -> Option<&'a Self>,
+    ) -> Hit8 {
+        let nd = rows[1].dot(rays.dir);
         let dir = rays.dir.abs().sum();
-        let bound = if CERTIFY { anchor.bound.mul_add(dir, float8(VANISHED)) } else { Float8::ZERO };
-        let mut possible = Mask8::ge(least, -bound);
-        if !possible.any() {
+        let crossing = Crossing::new::<CERTIFY>(anchor.height, anchor.error, nd, dir);
+        let (mut met, mut open) = crossing.on::<CERTIFY>(rays);
+        if CULL {
+            met &= !side_hidden(nd, hidden) | open;
+        }
+        if !met.any() {
             return Hit8::none();
         }
-        let crossing = Crossing::new::<CERTIFY>(anchor.height, anchor.error, nd, dir);
-        let (met, mut open) = crossing.on::<CERTIFY>(rays);
-        possible &= met;
-        if CULL {
-            possible &= !side_hidden(nd, hidden) | open;
+        let x = rays.dir.mul_add(crossing.t, -anchor.f);
+        let u = Mask8::lt(*axis, Float8::splat(0.5)).select(x.y, x.x);
+        let v = Mask8::gt(*axis, Float8::splat(1.5)).select(x.y, x.z);
+        let mut least = Float8::splat(f32::INFINITY);
+        for [across_u, across_v, edge] in edges {
+            least = least.fast_min(across_u.mul_add(u, across_v.mul_sub(v, *edge)));
         }
+        if !CERTIFY {
+            let mask = met & Mask8::ge(least, Float8::ZERO);
+            return Hit8 { t: crossing.t, error: Float8::ZERO, mask, doubt: Mask8::NONE };
+        }
+        // A corner beside the plane is seen aside by that over the cosine.
+        let along = crossing.error + *warp * crossing.inv.abs();
+        let bound = along.mul_add(dir, x.abs().sum().mul_add(roundings(10.0), anchor.slip));
+        let possible = met & !Mask8::lt(least, -bound);
         open &= possible;
-        let mut doubt = open;
-        if CERTIFY {
-            doubt |= possible & Mask8::le(least, bound);
-        }
+        let doubt = open | (possible & !Mask8::gt(least, bound));
         Hit8 { t: crossing.t, error: crossing.error, mask: possible & !open, doubt }
     }
 
@@ -109,8 +132,13 @@ impl<const N: usize> Part for PolygonPart<N> {
     }
 
     #[inline(always)]
-    fn surface((normal, corners): &Self::Rows, rays: &RayPacket, t: Float8) -> Surface8 {
-        flat_surface(corners[0], *normal, rays, t)
+    fn face(((face, _), _): &Self::Rows) -> &[Vec3x8; 2] {
+        face
+    }
+
+    #[inline(always)]
+    fn surface([center, normal]: &Self::Face, rays: &RayPacket, t: Float8) -> Surface8 {
+        flat_surface(*center, *normal, rays, t)
     }
 
     /// In scene units along the first edge and across it. Polygons with `uvs` interpolate those instead.

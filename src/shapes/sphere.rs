@@ -14,7 +14,7 @@ use crate::scene::Visible;
 pub struct Anchor {
     f: Vec3x8,     // from the origin to the center
     r2: Float8,    // radius squared
-    c: Float8,     // |f|^2 - r^2, which does not cancel
+    c: Float8,     // |f|^2 - r^2, of no use where that cancels
     near: Mask8,   // origins whose distance from the surface is small beside the radius
     bound: Float8, // error of the slack below, the rounding of the scene to f32 included
     slip: Float8,  // of places along a ray of length 1, likewise
@@ -23,6 +23,7 @@ pub struct Anchor {
 impl Part for SpherePart {
     /// Center and radius.
     type Rows = (Vec3x8, Float8);
+    type Face = Self::Rows;
     type Anchor = Anchor;
 
     fn row(&self) -> (DVec3, f64) {
@@ -30,16 +31,17 @@ impl Part for SpherePart {
     }
 
     #[inline(always)]
-    fn anchor<'a>(rows: &Self::Rows, origin: &Vec3x8, part: impl Fn(usize) -> Option<&'a Self>) -> Anchor {
+    fn bounds8((center, radius): &Self::Rows) -> (Vec3x8, Vec3x8) {
+        let half = Vec3x8::new(*radius, *radius, *radius);
+        (*center - half, *center + half)
+    }
+
+    #[inline(always)]
+    fn anchor(rows: &Self::Rows, origin: &Vec3x8) -> Anchor {
         let (center, radius) = *rows;
         let f = center - *origin;
         let (ff, r2) = (f.dot(f), radius * radius);
-        let mut c = ff - r2;
-        let near = Mask8::lt(c.abs(), r2);
-        if near.any() {
-            let origin = *origin; // a copy for the call alone: the loop around it keeps its own in registers
-            c = near_products(near, c, &origin, part);
-        }
+        let c = ff - r2;
         // The center rounds with the scene, f with the subtraction, and the direction moves the ray by a rounding
         // of f beside the center; 1-norms stand for lengths.
         let (from, to) = (center.abs().sum(), f.abs().sum());
@@ -48,7 +50,7 @@ impl Part for SpherePart {
         let bound = roundings(24.0) * r2 + roundings(4.5) * radius * reach + far.mul_add(far, float8(VANISHED));
         // 13 of it for the closest approach; the nearer root takes as many again from c over z.
         let slip = roundings(26.0).mul_add(to, roundings(8.0) * from);
-        Anchor { f, r2, c, near, bound, slip }
+        Anchor { f, r2, c, near: Mask8::lt(c.abs(), r2), bound, slip }
     }
 
     /// Shapes: eight lanes throughout. Units: `t` counts lengths of `dir`, which need not be 1.
@@ -57,23 +59,35 @@ impl Part for SpherePart {
     /// intersection", Ray Tracing Gems, 2019, chapter 7: the distance from the line to the centre is
     /// measured before it is squared, so that nothing cancels far away, and the second root comes
     /// from the product of both. Close to a surface that is large beside the distance, that distance
-    /// says nothing and the discriminant is formed from compensated products instead.
+    /// says only who passes by for certain; for the others the discriminant is formed from compensated
+    /// products instead.
     #[inline(always)]
-    fn hit<const CULL: bool, const CERTIFY: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
-        let Anchor { f, r2, c, near, bound, slip } = *anchor;
-        let bound = if CERTIFY { bound } else { Float8::ZERO };
+    fn hit<'a, const CULL: bool, const CERTIFY: bool>(
+        _: &Self::Rows,
+        anchor: &Anchor,
+        rays: &RayPacket,
+        hidden: &Hidden8,
+        part: impl Fn(usize) -> Option<&'a Self>,
+    ) -> Hit8 {
+        let Anchor { f, r2, mut c, near, bound, slip } = *anchor;
         let fd = f.dot(rays.dir);
         let p = fd * rays.inv_dd;
         let perp = rays.dir.mul_add(-p, f); // from the closest approach to the center
         let mut slack = r2 - perp.dot(perp); // < 0 outside the silhouette, 0 when touching
-        if near.any() {
-            let dd = rays.dir.dot(rays.dir);
-            slack = near.select(difference_of_products(fd, fd, dd, c) * rays.inv_dd, slack);
-        }
         // Where squares overflow there is no slack, and all is open.
-        let possible = if CERTIFY { !Mask8::lt(slack, -bound) } else { Mask8::ge(slack, Float8::ZERO) };
+        let mut possible = !Mask8::lt(slack, -bound);
         if !possible.any() {
             return Hit8::none();
+        }
+        let close = near & possible;
+        if close.any() {
+            c = near_products(close, c, &rays.origin, part);
+            let dd = rays.dir.dot(rays.dir);
+            slack = close.select(difference_of_products(fd, fd, dd, c) * rays.inv_dd, slack);
+        }
+        let bound = if CERTIFY { bound } else { Float8::ZERO };
+        if close.any() || !CERTIFY {
+            possible = if CERTIFY { !Mask8::lt(slack, -bound) } else { Mask8::ge(slack, Float8::ZERO) };
         }
         let dd = rays.dir.dot(rays.dir);
         let s = (slack * dd).sqrt(); // NaN outside, and NaN fails every comparison
@@ -86,10 +100,10 @@ impl Part for SpherePart {
             edge = slip * rays.inv_dd.sqrt();
             let error = a.abs().mul_add(roundings(8.0), bound / s + edge);
             (entry_error, exit_error) = (error, error);
-            if near.any() {
+            if close.any() {
                 // Here c is as good as its own rounding, and so is the smaller root, whose sign is certain.
                 let small = b.abs() * (error / a.abs() + roundings(4.0));
-                let small = near.select(small.fast_min(error), error);
+                let small = close.select(small.fast_min(error), error);
                 let first = Mask8::lt(a, b);
                 (entry_error, exit_error) = (first.select(error, small), first.select(small, error));
             }
@@ -130,6 +144,11 @@ impl Part for SpherePart {
         let t = nearer(a, b, t, visible);
         let normal = (t * ray.dir - (self.center - ray.origin)).normalize();
         Surface64 { t, point: self.center + normal * self.radius, normal }
+    }
+
+    #[inline(always)]
+    fn face(rows: &Self::Rows) -> &Self::Rows {
+        rows
     }
 
     /// From the decomposition that the kernel uses, never from (origin + t dir) - center.

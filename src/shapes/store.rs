@@ -16,6 +16,8 @@ pub struct Store<P: Part> {
     groups: Vec<Group>,
     sides: Sides,
     parts: Vec<P>,
+    /// By row: whose it is; of padding, whose the last part of the group is.
+    owners: Vec<Owner>,
 }
 
 /// Eight rows, from the start of a cache line.
@@ -47,7 +49,9 @@ impl<P: Part> Store<P> {
             let shown = |row| visible[parts[part_of(&groups, row)].owner().material as usize];
             sides = Sides::new((0..groups.len() * LANES).map(shown).collect());
         }
-        Store { blocks, groups, sides, parts }
+        let owners =
+            (0..groups.len() * LANES).into_par_iter().map(|row| parts[part_of(&groups, row)].owner()).collect();
+        Store { blocks, groups, sides, parts, owners }
     }
 
     /// A block that no ray can hit, in a store that has none.
@@ -76,7 +80,7 @@ impl<P: Part> Store<P> {
     /// Whose part a row is.
     #[inline(always)]
     pub fn owner(&self, row: usize) -> Owner {
-        self.parts[part_of(&self.groups, row)].owner()
+        self.owners[row]
     }
 
     /// The rows of a block, a lane each.
@@ -91,10 +95,14 @@ impl<P: Part> Store<P> {
         self.block(row / LANES).broadcast(row % LANES)
     }
 
-    /// Lane `k` is row `rows[k]`.
+    /// Lane `k` is the face of row `rows[k]`.
     #[inline(always)]
-    pub fn gather(&self, rows: &[usize; LANES]) -> P::Rows {
-        P::Rows::gather(|i| (self.block(rows[i] / LANES), rows[i] % LANES))
+    pub fn faces(&self, rows: &[u32; LANES]) -> P::Face {
+        let mut faces = [P::face(self.block(0)); LANES];
+        for (face, row) in faces.iter_mut().zip(rows) {
+            *face = P::face(self.block(*row as usize / LANES));
+        }
+        P::Face::gather(|i| (faces[i], rows[i] as usize % LANES))
     }
 
     /// Which sides of the rows are seen.
@@ -104,7 +112,9 @@ impl<P: Part> Store<P> {
 
     /// Memory of the columns in bytes.
     pub fn column_bytes(&self) -> usize {
-        self.blocks.capacity() * size_of::<Block<P::Rows>>() + self.groups.capacity() * size_of::<Group>()
+        self.blocks.capacity() * size_of::<Block<P::Rows>>()
+            + self.groups.capacity() * size_of::<Group>()
+            + self.owners.capacity() * size_of::<Owner>()
     }
 }
 

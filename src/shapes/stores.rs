@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::{Part, Ray64, Store, Surface8, Surface64, noise};
-use crate::lanes::{ExactPacket, Float8, LANES, Mask8, RayPacket};
+use crate::lanes::{Columns, ExactPacket, Float8, LANES, Mask8, RayPacket, bits};
 use crate::plan::{
     BoxPart, ConePart, CylinderPart, DiskPart, Kind, Owner, Parts, PlanePart, PolygonPart, SpherePart, TurnedBoxPart,
 };
@@ -147,20 +147,23 @@ impl Stores {
         t: Float8,
         exact: Option<&ExactPacket>,
     ) -> (Surface8, [Owner; LANES]) {
-        let hits = hits.to_array().map(RowRef::from_lane);
-        let Some((kind, first)) = hits.iter().find_map(|hit| Some((hit.kind()?, hit.row()))) else {
+        let hits = hits.to_array();
+        let mut left = 0;
+        for (lane, hit) in hits.iter().enumerate() {
+            left |= u32::from(RowRef::from_lane(*hit) != RowRef::MISS) << lane;
+        }
+        if left == 0 {
             return (Surface8::NOTHING, [Owner::default(); LANES]);
-        };
-        let of_kind = |kind| {
-            let same = hits.map(|hit| hit.is_of(kind));
-            let rows = std::array::from_fn(|lane| if same[lane] { hits[lane].row() } else { first });
-            (rows, same)
-        };
-        let (rows, same) = of_kind(kind);
-        let (mut surface, mut owners) = self.visit(kind, SurfaceOf::<NORMAL> { rows, rays, t });
-        let other = |lane: &usize| !same[*lane] && hits[*lane] != RowRef::MISS;
-        if (0..LANES).any(|lane| other(&lane)) {
-            self.add_other_kinds::<NORMAL>(kind, &hits, (rays, t), &mut surface, &mut owners);
+        }
+        let (mut surface, mut owners, others) = self.surface_of_kind::<NORMAL>(&hits, left, rays, t);
+        left &= others;
+        while left != 0 {
+            let (found, whose, others) = self.surface_of_kind::<NORMAL>(&hits, left, rays, t);
+            for lane in bits(left & !others) {
+                owners[lane] = whose[lane];
+            }
+            surface = surface.with(Mask8::from_bits(left & !others), &found);
+            left &= others;
         }
         if surface.vague.any() && self.certify {
             self.tell_faces(&hits, (rays, t), exact, &mut surface);
@@ -173,7 +176,7 @@ impl Stores {
     #[inline(never)]
     fn tell_faces(
         &self,
-        hits: &[RowRef; LANES],
+        hits: &[f32; LANES],
         (rays, t): (&RayPacket, Float8),
         exact: Option<&ExactPacket>,
         surface: &mut Surface8,
@@ -181,34 +184,32 @@ impl Stores {
         for lane in surface.vague.lanes() {
             let ray = Ray64::exact(&rays.lane(lane));
             let ray = exact.map_or(ray, |exact| ray.from(exact, lane));
-            if let Some(found) = self.refine(hits[lane], &ray, f64::from(t.as_array()[lane])) {
+            if let Some(found) = self.refine(RowRef::from_lane(hits[lane]), &ray, f64::from(t.as_array()[lane])) {
                 surface.set(lane, &found);
             }
         }
     }
 
-    #[inline(never)]
-    fn add_other_kinds<const NORMAL: bool>(
+    /// The same for the lanes that met something of the kind that the first of `left` met, and which did not.
+    #[inline(always)]
+    fn surface_of_kind<const NORMAL: bool>(
         &self,
-        done: Kind,
-        hits: &[RowRef; LANES],
-        (rays, t): (&RayPacket, Float8),
-        surface: &mut Surface8,
-        owners: &mut [Owner; LANES],
-    ) {
-        let mut done = 1u32 << done as u32;
-        for hit in hits {
-            let Some(kind) = hit.kind().filter(|kind| done >> *kind as u32 & 1 == 0) else { continue };
-            done |= 1 << kind as u32;
-            let rows = hits.map(|other| if other.is_of(kind) { other.row() } else { hit.row() });
-            let (found, whose) = self.visit(kind, SurfaceOf::<NORMAL> { rows, rays, t });
-            let mut same = 0;
-            for lane in (0..LANES).filter(|lane| hits[*lane].is_of(kind)) {
-                owners[lane] = whose[lane];
-                same |= 1 << lane;
-            }
-            *surface = surface.with(Mask8::from_bits(same), &found);
+        hits: &[f32; LANES],
+        left: u32,
+        rays: &RayPacket,
+        t: Float8,
+    ) -> (Surface8, [Owner; LANES], u32) {
+        let first = RowRef::from_lane(hits[left.trailing_zeros() as usize % LANES]);
+        let (mut rows, mut others) = ([first.row() as u32; LANES], 0);
+        for (lane, row) in rows.iter_mut().enumerate() {
+            let hit = RowRef::from_lane(hits[lane]);
+            let same = hit.0 >> 28 == first.0 >> 28;
+            *row = if same { hit.row() as u32 } else { *row };
+            others |= u32::from(!same) << lane;
         }
+        let kind = first.kind().unwrap_or(Kind::Sphere);
+        let (surface, owners) = self.visit(kind, SurfaceOf::<NORMAL> { rows: &rows, rays, t });
+        (surface, owners, others)
     }
 
     /// Where a ray first meets a side of a row that is seen, in f64.
@@ -275,6 +276,13 @@ impl RowRef {
         self.0 >> 28 == kind as u32
     }
 
+    /// Whether it lies in a plane.
+    #[inline(always)]
+    pub fn is_flat(self) -> bool {
+        let kind = self.0 >> 28;
+        kind >= Kind::Plane as u32 && kind <= Kind::Octagon as u32
+    }
+
     /// Its row in the store of its kind.
     #[inline(always)]
     pub fn row(self) -> usize {
@@ -314,7 +322,7 @@ impl Visit for OwnerOf {
 }
 
 struct SurfaceOf<'a, const NORMAL: bool> {
-    rows: [usize; LANES],
+    rows: &'a [u32; LANES],
     rays: &'a RayPacket,
     t: Float8,
 }
@@ -324,12 +332,20 @@ impl<const NORMAL: bool> Visit for SurfaceOf<'_, NORMAL> {
     #[inline(never)]
     fn visit<P: Part>(self, store: &Store<P>) -> Self::Output {
         let first = self.rows[0];
-        let (surface, owners) = match self.rows == [first; LANES] {
-            true => (P::surface(&store.splat(first), self.rays, self.t), [store.owner(first); LANES]),
-            false => (P::surface(&store.gather(&self.rows), self.rays, self.t), self.rows.map(|row| store.owner(row))),
+        let mut owners = [store.owner(first as usize); LANES];
+        let mut surface = if self.rows.iter().all(|row| *row == first) {
+            let face = P::face(store.block(first as usize / LANES)).broadcast(first as usize % LANES);
+            P::surface(&face, self.rays, self.t)
+        } else {
+            for (owner, row) in owners.iter_mut().zip(self.rows) {
+                *owner = store.owner(*row as usize);
+            }
+            P::surface(&store.faces(self.rows), self.rays, self.t)
         };
-        let Surface8 { normal, vague, .. } = surface;
-        let surface = if NORMAL { Surface8 { normal, vague, ..Surface8::NOTHING } } else { surface };
+        if NORMAL {
+            let Surface8 { normal, vague, .. } = surface;
+            surface = Surface8 { normal, vague, ..Surface8::NOTHING };
+        }
         (surface, owners)
     }
 }

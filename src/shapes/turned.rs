@@ -20,15 +20,22 @@ pub struct Anchor {
 impl Part for TurnedBoxPart {
     /// Center and half size, and the unit axes.
     type Rows = ([Vec3x8; 2], [Vec3x8; 3]);
+    type Face = Self::Rows;
     type Anchor = Anchor;
 
     fn row(&self) -> ([DVec3; 2], [DVec3; 3]) {
         ([self.center, self.half], self.axes)
     }
 
+    #[inline(always)]
+    fn bounds8(([center, half], axes): &Self::Rows) -> (Vec3x8, Vec3x8) {
+        let reach = axes[0].abs() * half.x + axes[1].abs() * half.y + axes[2].abs() * half.z;
+        (*center - reach, *center + reach)
+    }
+
     /// The difference is turned, not its two ends: far from the origin that keeps the box's size.
     #[inline(always)]
-    fn anchor<'a>(rows: &Self::Rows, origin: &Vec3x8, _: impl Fn(usize) -> Option<&'a Self>) -> Anchor {
+    fn anchor(rows: &Self::Rows, origin: &Vec3x8) -> Anchor {
         let ([center, half], axes) = *rows;
         let from = center - *origin;
         let f = local(&axes, from);
@@ -39,7 +46,13 @@ impl Part for TurnedBoxPart {
     }
 
     #[inline(always)]
-    fn hit<const CULL: bool, const CERTIFY: bool>(anchor: &Anchor, rays: &RayPacket, hidden: &Hidden8) -> Hit8 {
+    fn hit<'a, const CULL: bool, const CERTIFY: bool>(
+        _: &Self::Rows,
+        anchor: &Anchor,
+        rays: &RayPacket,
+        hidden: &Hidden8,
+        _: impl Fn(usize) -> Option<&'a Self>,
+    ) -> Hit8 {
         let Anchor { min, max, error, axes } = anchor;
         let dir = local(axes, rays.dir);
         Stretch::new::<CERTIFY>(*min, *max, *error, dir, turning(rays)).first_of::<CULL, CERTIFY>(hidden, rays)
@@ -61,8 +74,13 @@ impl Part for TurnedBoxPart {
         Surface64 { t, point: self.center + turned, normal: side * self.axes[axis] }
     }
 
+    #[inline(always)]
+    fn face(rows: &Self::Rows) -> &Self::Rows {
+        rows
+    }
+
     fn surface(rows: &Self::Rows, rays: &RayPacket, t: Float8) -> Surface8 {
-        let Anchor { min, max, error, .. } = Self::anchor(rows, &rays.origin, |_| None);
+        let Anchor { min, max, error, .. } = Self::anchor(rows, &rays.origin);
         let ([center, half], axes) = *rows;
         let turned = turning(rays);
         let face = Face::at(t, [min, max, error], local(&axes, rays.dir), turned);
