@@ -99,3 +99,37 @@ fn what_rests_does_not_blur() {
     let noisy = Renderer::new(&still).expect("complete").noise(Some(0.1)).moments(&scenes);
     assert_eq!(noisy.render(&()).expect_err("both"), RenderError::NoiseWithShutter);
 }
+
+/// The command line: a frame that is blurred says so in its header, is stale when the next one changes, and can be
+/// rendered again from what it says.
+#[test]
+fn blurred_frames_know_where_they_go() {
+    let room = tempfile::tempdir().expect("a directory");
+    let file = |name: &str, text: &str| std::fs::write(room.path().join(name), text).expect("written");
+    let scene = "[image]\nwidth = 40\nheight = 30\nspp = 4\n[camera]\ntype = \"orthographic\"\nheight = 6\neye = [0, 0, 9]\n\
+                 target = [0, 0, 0]\n[materials.m]\ntype = \"diffuse\"\n[ambient]\ncolor = [1, 1, 1]\n\
+                 [[clouds]]\ntype = \"spheres\"\nfile = \"p.#.csv\"\nmaterial = \"m\"\n";
+    file("s.toml", scene);
+    (1..4).for_each(|frame| file(&format!("p.{frame:04}.csv"), &format!("x,y,z,r\n{frame},0,0,0.5\n")));
+    let octray = |words: &[&str]| {
+        let mut command = assert_cmd::Command::cargo_bin("octray").expect("built");
+        let output = command.current_dir(room.path()).args(words).output().expect("run");
+        (output.status.code(), String::from_utf8_lossy(&output.stdout).into_owned())
+    };
+    let render = ["render", "s.toml", "--frames", "1-2", "--out-dir", "out", "--shutter", "0.5", "--resume"];
+    assert_eq!(octray(&render).0, Some(0));
+    let verdict = octray(&["verify", "out/s.0001.exr", "s.toml"]);
+    assert!(verdict.0 == Some(0) && verdict.1.contains("confirmed"), "{verdict:?}");
+    let still = octray(&["render", "s.toml", "-o", "still.exr"]);
+    assert_eq!(still.0, Some(0));
+    assert_eq!(octray(&["compare", "still.exr", "out/s.0001.exr", "--max-rmse", "0.01"]).0, Some(1));
+    let pictures =
+        || ["out/s.0001.exr", "out/s.0002.exr"].map(|name| std::fs::read(room.path().join(name)).expect("there"));
+    let before = pictures();
+    assert_eq!(octray(&render).0, Some(0));
+    assert!(before == pictures(), "nothing is stale");
+    file("p.0003.csv", "x,y,z,r\n2.5,0,0,0.5\n");
+    assert_eq!(octray(&render).0, Some(0));
+    let after = pictures();
+    assert!(before[0] == after[0] && before[1] != after[1], "only the second goes there");
+}

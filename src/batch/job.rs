@@ -9,7 +9,7 @@ use crate::output::{self, Description, Format, description};
 use crate::plan::SkipSet;
 use crate::render::{Engine, RenderError, Renderer, Stats};
 use crate::scene::particles::Look;
-use crate::scene::{Camera, Integrator, Scene};
+use crate::scene::{Aov, Camera, Integrator, Scene};
 
 /// One picture.
 #[derive(Debug, Clone, PartialEq)]
@@ -128,6 +128,13 @@ impl Job {
         // Names that are none were refused when the job was made.
         let layers = settings.layers.layers(scene).unwrap_or(scene.layers);
         Ok(settings.windows.apply(renderer).layers(layers))
+    }
+
+    /// Whether, by its own settings, its picture depends on the next frame as well.
+    pub fn looks_ahead(&self) -> bool {
+        let settings = &self.settings;
+        let moves = settings.layers.aovs.iter().any(|name| name == Aov::Motion.name() || name == "all");
+        moves || settings.shutter.is_some_and(|shutter| shutter > 0.0)
     }
 
     /// What its file says of where it comes from.

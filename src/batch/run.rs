@@ -5,6 +5,7 @@
 //! when the list is empty those without a job help with what is left, so that no core idles before the last block.
 //! While a large picture is traced by all, nobody opens another one; while one is read or built, others are.
 
+use std::collections::HashSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -85,6 +86,8 @@ struct Batch<'a> {
     done: AtomicU64,
     stop: AtomicBool,
     summary: Mutex<Summary>,
+    /// Scene files whose memory was forecast.
+    forecast: Mutex<HashSet<PathBuf>>,
     threads: usize,
 }
 
@@ -121,6 +124,7 @@ pub fn run(jobs: &[Job], options: &Options, sources: &Sources, watch: &dyn Watch
         done: AtomicU64::new(0),
         stop: AtomicBool::new(false),
         summary: Mutex::default(),
+        forecast: Mutex::default(),
         threads: pool.current_num_threads(),
     };
     let room = Room::default();
@@ -291,14 +295,7 @@ impl Batch<'_> {
         if self.options.annotations {
             renderer = renderer.layers(wanted.with(Aov::Ids));
         }
-        let scene_hash = match &next {
-            // What is blurred depends on where it goes.
-            Some(next) if renderer.settings().shutter > 0.0 => {
-                let both = format!("{} {}", renderer.hash_after(shared.sum()), next.sum().hash(""));
-                sha256(&mut both.as_bytes()).map(|hash| hex(&hash)).unwrap_or_default()
-            }
-            _ => renderer.hash_after(shared.sum()),
-        };
+        let scene_hash = shared.picture_hash(&renderer, next.as_deref());
         if self.options.resume && existing::is_current(job, &renderer, &scene_hash) {
             return Ok(None);
         }
@@ -406,10 +403,14 @@ impl Batch<'_> {
         let Some(limit) = self.options.max_memory else { return Ok(()) };
         let pixels = job.settings.resolution.map_or(0, |(width, height)| u64::from(width) * u64::from(height));
         let need = forecast(&job.scene, job.frame()).saturating_add(PIXEL_BYTES * pixels);
+        let mib = |bytes: u64| bytes.div_ceil(1 << 20);
         if need <= limit {
+            // Once a scene file, before it is read.
+            if lock(&self.forecast).insert(job.scene.clone()) {
+                self.watch.event(&Event::Forecast(job, mib(need), mib(limit)));
+            }
             return Ok(());
         }
-        let mib = |bytes: u64| bytes.div_ceil(1 << 20);
         let scene = job.scene.display();
         Err(JobError::Memory(format!(
             "{scene}: about {} MiB of memory are needed, and the limit is {} MiB",
@@ -431,7 +432,13 @@ impl Batch<'_> {
 
     /// A hash over all files that the scene of a job names.
     fn files_hash(&self, job: &Job) -> Option<String> {
-        lock(&self.hashes).scene(&job.scene, job.frame()).ok()
+        let mut hashes = lock(&self.hashes);
+        let own = hashes.scene(&job.scene, job.frame()).ok()?;
+        if !job.looks_ahead() {
+            return Some(own);
+        }
+        let next = hashes.scene(&job.scene, job.frame() + 1).unwrap_or_default();
+        sha256(&mut format!("{own} {next}").as_bytes()).map(|hash| hex(&hash)).ok()
     }
 
     /// Called when a file has its name, or will not get it.

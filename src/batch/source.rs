@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use super::Job;
+use crate::render::Renderer;
+use crate::scene::inputs::{hex, sha256};
 use crate::scene::particles::Look;
 use crate::scene::{Frames, Scene, SceneErrors, SceneSum};
 
@@ -29,6 +31,18 @@ pub struct Shared {
 }
 
 impl Shared {
+    /// The hash of the scene and of a picture's settings, and of the next frame where what is blurred goes there.
+    pub fn picture_hash(&self, renderer: &Renderer, next: Option<&Shared>) -> String {
+        let own = renderer.hash_after(self.sum());
+        match next {
+            Some(next) if renderer.settings().shutter > 0.0 => {
+                let both = format!("{own} {}", next.sum().hash(""));
+                sha256(&mut both.as_bytes()).map_or(own, |hash| hex(&hash))
+            }
+            _ => own,
+        }
+    }
+
     /// It as a hash, made once.
     pub fn sum(&self) -> &SceneSum {
         self.sum.get_or_init(|| self.scene.sum())

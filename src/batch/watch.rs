@@ -41,6 +41,8 @@ pub enum Event<'a> {
     FrameDone(usize, &'a Job, &'a Report),
     /// The file of a job was there already, whole and up to date.
     Skipped(usize, &'a Job),
+    /// The first job of a scene file: MiB that it will take, as guessed from its files, and MiB that are allowed.
+    Forecast(&'a Job, u64, u64),
     /// Something about a job that may be wrong.
     Warning(usize, &'a Job, String),
     /// A job failed; the others go on.

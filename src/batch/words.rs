@@ -61,7 +61,7 @@ fn of_layers(scenes: Layers, layers: Layers, words: &mut Vec<String>) {
 
 fn of_settings(scene: &Scene, settings: &RenderSettings, words: &mut Vec<String>) {
     let scenes = &scene.render;
-    let RenderSettings { integrator, max_depth, seed, noise, .. } = settings;
+    let RenderSettings { integrator, max_depth, seed, noise, shutter, .. } = settings;
     let name = match integrator {
         Integrator::Direct => "direct",
         Integrator::Ao => "ao",
@@ -71,6 +71,7 @@ fn of_settings(scene: &Scene, settings: &RenderSettings, words: &mut Vec<String>
     put_given(words, "--max-depth", (*max_depth != scenes.max_depth).then_some(max_depth));
     put_given(words, "--seed", (*seed != scenes.seed).then_some(seed));
     put_given(words, "--noise", noise.filter(|_| *noise != scenes.noise));
+    put_given(words, "--shutter", (*shutter != scenes.shutter).then_some(shutter));
 }
 
 /// What the command line can say of atoms.

@@ -202,6 +202,10 @@ impl Watch for Teller<'_> {
                 let (frame, output) = (job.frame(), job.to_string());
                 self.line(json!({ "event": "frame_skipped", "job": index, "frame": frame, "output": output }));
             }
+            Event::Forecast(job, need, limit) => {
+                let scene = job.scene.display();
+                self.note(&format!("{scene}: about {need} MiB of memory are forecast, {limit} MiB are allowed"));
+            }
             Event::Warning(index, job, text) => {
                 self.note(&format!("octray: {text}"));
                 self.line(json!({ "event": "warning", "job": index, "frame": job.frame(), "text": text }));

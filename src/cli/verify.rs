@@ -230,7 +230,9 @@ fn hash(job: &Job, sources: &Sources, run: &Run) -> Result<String, Failure> {
     let loaded = sources.load(sources.ticket(job));
     let (shared, _) = loaded.map_err(|errors| scene_file::failure(&job.scene, &errors, run.console.color))?;
     let renderer = job.renderer(&shared.scene).map_err(|error| Failure::from(error).of(&job.scene))?;
-    Ok(renderer.scene_hash())
+    let next = (renderer.settings().shutter > 0.0).then(|| Job { frame: Some(job.frame() + 1), ..job.clone() });
+    let next = next.and_then(|next| sources.load(sources.ticket(&next)).ok());
+    Ok(shared.picture_hash(&renderer, next.as_ref().map(|(next, _)| &**next)))
 }
 
 /// How far a window reaches beyond the picture, at most.

@@ -69,6 +69,11 @@ impl CameraRays {
         self.common
     }
 
+    /// Whether the rays of a pixel depend on its sample pattern.
+    pub fn draws(&self) -> bool {
+        self.filter.is_some() || matches!(self.optics, Optics::Lens(..))
+    }
+
     /// The sample pattern of a pixel.
     pub fn pattern(&self, x: i32, y: i32) -> PixelPattern {
         let key = sample::pixel_key(self.seed, x, y);

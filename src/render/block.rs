@@ -101,6 +101,7 @@ impl Block {
         let before = (Counts::default(), RayCounts::default());
         let room = Room::default();
         let mut work = Work { rays, direct, record, sums, room, before, tiles: 0, background_tiles: 0 };
+        let draws = R::ON || rays.draws() || direct.draws();
         let (mut batch, mut blank_samples) = (Batch::default(), 0);
         for code in 0..(EDGE * EDGE) as u32 {
             let (x, y) = (window.x0 + compact(code), window.y0 + compact(code >> 1));
@@ -116,7 +117,7 @@ impl Block {
                 continue;
             }
             batch.sees |= sees;
-            let pattern = rays.pattern(x, y);
+            let pattern = if draws { rays.pattern(x, y) } else { PixelPattern::default() };
             let mut sample = range.start;
             while sample < range.end {
                 sample = batch.push((x, y), pattern, sample..range.end, index);
