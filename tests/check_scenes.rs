@@ -67,7 +67,20 @@ fn the_engine_agrees_with_the_reference_where_f32_is_bad() {
             apex_radius = {apex_radius}\nmaterial = \"mirror\"\n"
         )
     };
-    let cases = [1e3, 1e5, 1e7].map(ground).into_iter().chain([0.0, 1e-4].map(tip));
+    // From a million radii, through a lens as long and by parallel rays: coordinates are those of what is seen.
+    let far = |camera: &str| {
+        format!(
+            "{view}[camera]\neye = [30, 40, 1e6]\ntarget = [0, 0, 0]\n{camera}\n\
+            [[lights]]\ntype = \"directional\"\ndirection = [-1, -1, -2]\nirradiance = [3, 3, 3]\n\
+            [[lights]]\ntype = \"point\"\nposition = [-3, 3, 3]\nintensity = [12, 6, 3]\n\
+            [[shapes]]\ntype = \"sphere\"\ncenter = [0.1, 0.05, 0]\nradius = 1\nmaterial = \"clay\"\n\
+            [[shapes]]\ntype = \"sphere\"\ncenter = [1.3, 0.6, 0.2]\nradius = 0.5\nmaterial = \"mirror\"\n\
+            [[shapes]]\ntype = \"box\"\nmin = [-2, -1.2, -1]\nmax = [2, -1, 1]\nmaterial = \"clay\"\n\
+            [[shapes]]\ntype = \"cone\"\nbase = [-1.4, -1, 0.5]\napex = [-1.4, 0.2, 0.5]\nradius = 0.3\nmaterial = \"clay\"\n"
+        )
+    };
+    let far = ["type = \"pinhole\"\nvfov = 0.0002", "type = \"orthographic\"\nheight = 3.2"].map(far);
+    let cases = [1e3, 1e5, 1e7].map(ground).into_iter().chain([0.0, 1e-4].map(tip)).chain(far);
     let check = |(index, text): (usize, String)| {
         let scene = Scene::from_toml(&text, Path::new(".")).unwrap_or_else(|errors| panic!("{errors}"));
         failure(Path::new(&format!("case {index}")), &scene, 5000)

@@ -108,29 +108,30 @@ fn count(parts: &Parts, kind: Kind) -> usize {
 
 fn items(parts: &Parts) -> Vec<Item> {
     let mut items = Vec::new();
-    add(&mut items, Kind::Sphere, &parts.spheres);
-    add(&mut items, Kind::Disk, &parts.disks);
-    add(&mut items, Kind::Triangle, &parts.triangles);
-    add(&mut items, Kind::Quad, &parts.quads);
-    add(&mut items, Kind::Octagon, &parts.octagons);
-    add(&mut items, Kind::Box, &parts.boxes);
-    add(&mut items, Kind::TurnedBox, &parts.turned_boxes);
-    add(&mut items, Kind::Cylinder, &parts.cylinders);
-    add(&mut items, Kind::Cone, &parts.cones);
+    add(&mut items, parts.rounded_origins, Kind::Sphere, &parts.spheres);
+    add(&mut items, parts.rounded_origins, Kind::Disk, &parts.disks);
+    add(&mut items, parts.rounded_origins, Kind::Triangle, &parts.triangles);
+    add(&mut items, parts.rounded_origins, Kind::Quad, &parts.quads);
+    add(&mut items, parts.rounded_origins, Kind::Octagon, &parts.octagons);
+    add(&mut items, parts.rounded_origins, Kind::Box, &parts.boxes);
+    add(&mut items, parts.rounded_origins, Kind::TurnedBox, &parts.turned_boxes);
+    add(&mut items, parts.rounded_origins, Kind::Cylinder, &parts.cylinders);
+    add(&mut items, parts.rounded_origins, Kind::Cone, &parts.cones);
     items
 }
 
-fn add<P: Part>(items: &mut Vec<Item>, kind: Kind, parts: &[P]) {
+fn add<P: Part>(items: &mut Vec<Item>, origins: DVec3, kind: Kind, parts: &[P]) {
     let item = |(index, part): (usize, &P)| {
         let (min, max) = part.bounds();
-        Item { kind, index: index as u32, aabb: outward(min, max) }
+        Item { kind, index: index as u32, aabb: outward(min, max, origins) }
     };
     items.par_extend(parts.par_iter().enumerate().map(item));
 }
 
-/// Bounds in f32 that hold the exact part and the rounded one: 4 roundings of the larger coordinate out.
-fn outward(min: DVec3, max: DVec3) -> Aabb {
-    let pad = min.abs().max(max.abs()) * f64::from(2.0 * f32::EPSILON);
+/// Bounds in f32 that hold the exact part and the rounded one, where rays that were rounded see them too: 4 roundings of
+/// the larger coordinate out, and of that of an origin.
+fn outward(min: DVec3, max: DVec3, origins: DVec3) -> Aabb {
+    let pad = (min.abs().max(max.abs()) + origins) * f64::from(2.0 * f32::EPSILON);
     let (min, max) = ((min - pad).as_vec3(), (max + pad).as_vec3());
     let down = Vec3::new(min.x.next_down(), min.y.next_down(), min.z.next_down());
     let up = Vec3::new(max.x.next_up(), max.y.next_up(), max.z.next_up());
@@ -322,5 +323,6 @@ fn reorder(parts: Parts, order: &[Vec<Place>]) -> Parts {
         cylinders: same(&parts.cylinders, order, Kind::Cylinder),
         cones: same(&parts.cones, order, Kind::Cone),
         planes: parts.planes,
+        rounded_origins: parts.rounded_origins,
     }
 }

@@ -97,9 +97,11 @@ impl Bundle {
     /// Bounds of the packets of `live`, a lane a packet; the other lanes mean nothing.
     pub fn beam(&self, live: u32) -> Beam {
         let (mut back, mut split) = ([false; 3], [false; 3]);
+        // Origins of camera rays may have been rounded.
+        let origins = self.origins.map(|axis| axis.widened(axis.size() * float8(4.0 * UNIT_ROUNDOFF)));
         let mut beam = Beam {
-            origin_near: self.origins.map(|axis| axis.high),
-            origin_far: self.origins.map(|axis| axis.low),
+            origin_near: origins.map(|axis| axis.high),
+            origin_far: origins.map(|axis| axis.low),
             inv_near: [Float8::ZERO; 3],
             inv_far: [Float8::ZERO; 3],
             near: near_planes(back),

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::direct::Direct;
-use super::record::{Record, Seen};
+use super::record::{RayKind, Record, Seen};
 use super::wave::Wave;
 use crate::lanes::{Float8, LANES, Mask8, UNIT_ROUNDOFF, Vec3x8, bits, float8};
 use crate::plan::{Owner, Skip};
@@ -55,6 +55,15 @@ impl Direct<'_> {
         let before = wave.tile.exact.as_ref().map(|exact| &exact[p]);
         let (mut surface, owners) = stores.surface::<false>(wave.tile.hits[p], rays, rays.t_max, before);
         let owners = &owners;
+        if self.plan.sharp && wave.kind == RayKind::Camera {
+            stores.sharpen(
+                Mask8::from_bits(hit),
+                &wave.tile.hits[p].to_array(),
+                (rays, rays.t_max),
+                before,
+                &mut surface,
+            );
+        }
         let first = exact.len();
         if self.goes_on() {
             self.refine(wave, (p, hit), owners, &mut surface, exact);

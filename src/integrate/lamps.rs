@@ -65,7 +65,8 @@ impl Emitters {
         let lit = Material { name: String::new(), model, back: None, visible: Visible::Front };
         let objects: Vec<Object> = places.iter().filter_map(shape).map(object).collect();
         let scene = Scene { objects, materials: vec![lit], ..Scene::default() };
-        let own = Plan::new(&scene, plan.origin);
+        let mut own = Plan::new(&scene, plan.origin);
+        own.rounded_origins = plan.rounded_origins;
         (!places.is_empty()).then(|| Emitters { tree: Tree::new(own.parts(), &own.visible), places })
     }
 }

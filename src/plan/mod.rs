@@ -2,6 +2,7 @@
 //! and what can be left out.
 
 mod needs;
+mod origin;
 mod parts;
 mod reach;
 mod skips;
@@ -18,7 +19,7 @@ use self::needs::Needs;
 pub use self::parts::{
     BoxPart, ConePart, CylinderPart, DiskPart, Kind, Owner, Parts, PlanePart, PolygonPart, SpherePart, TurnedBoxPart,
 };
-use crate::scene::{Aov, Integrator, Layers, Lens, Material, Object, Scene, Shape, Visible};
+use crate::scene::{Aov, Camera, Integrator, Layers, Lens, Material, Object, Scene, Shape, Visible};
 
 /// Decisions about one scene seen from one origin.
 #[derive(Debug)]
@@ -28,6 +29,10 @@ pub struct Plan<'s> {
     /// What all f32 coordinates are relative to, subtracted in f64 before they are rounded: a scene that
     /// is moved far away renders the same.
     pub origin: DVec3,
+    /// Camera rays meet surfaces in f64, since f32 would show.
+    pub sharp: bool,
+    /// The most that the coordinates of origins are which were rounded to f32, relative to `origin`.
+    pub rounded_origins: DVec3,
     /// By material: the sides that are seen.
     pub visible: Vec<Visible>,
     /// By material: the materials of its back and of its front.
@@ -89,6 +94,8 @@ impl<'s> Plan<'s> {
         let mut plan = Plan {
             scene,
             origin,
+            sharp: false,
+            rounded_origins: DVec3::ZERO,
             visible,
             sides,
             colored,
@@ -106,6 +113,12 @@ impl<'s> Plan<'s> {
         plan
     }
 
+    /// Plans for the rays of a camera, in a picture of so many rows.
+    pub fn seen_from(allowed: SkipSet, scene: &'s Scene, camera: &Camera, rows: u32) -> Self {
+        let (origin, sharp) = origin::origin(scene, camera, rows);
+        Plan { sharp, ..Plan::leaving_out(allowed, scene, origin) }
+    }
+
     /// Leaves out the layers that are not among those asked for, in place of the scene's.
     pub fn leave_out_layers(&mut self, asked: Layers) {
         let unasked: Vec<&str> = Aov::ALL.into_iter().filter(|aov| !asked.has(*aov)).map(Aov::name).collect();
@@ -115,6 +128,7 @@ impl<'s> Plan<'s> {
 
     /// Leaves out what only matters beside the pixels that are asked for.
     pub fn look(&mut self, sight: &Sight) {
+        self.rounded_origins = origin::origins(sight, self.origin);
         let is_plane = |object: &Object| matches!(object.shape, Shape::Plane(_));
         let is_straight = match sight.camera.lens {
             Lens::Pinhole { .. } | Lens::Orthographic { .. } => true,
@@ -133,7 +147,8 @@ impl<'s> Plan<'s> {
 
     /// All parts of the scene, relative to the origin.
     pub fn parts(&self) -> Parts {
-        Parts::new(self.scene, self.origin, self.needed.as_deref())
+        let parts = Parts::new(self.scene, self.origin, self.needed.as_deref());
+        Parts { rounded_origins: self.rounded_origins, ..parts }
     }
 
     /// The material of the side that a ray met.

@@ -251,6 +251,8 @@ pub struct Parts {
     pub cylinders: Vec<CylinderPart>,
     /// Cones.
     pub cones: Vec<ConePart>,
+    /// The most that the coordinates of origins of rays are which were rounded to f32.
+    pub rounded_origins: DVec3,
 }
 
 impl Parts {

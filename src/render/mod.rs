@@ -359,7 +359,7 @@ impl<'s> Renderer<'s> {
 
     /// What this render does and what it leaves out.
     pub fn plan(&self) -> Plan<'s> {
-        let mut plan = Plan::leaving_out(self.skips, self.scene, self.camera.eye);
+        let mut plan = Plan::seen_from(self.skips, self.scene, self.camera, self.image.height);
         let display = (self.image.width, self.image.height);
         plan.leave_out_layers(self.layers);
         let full = Window::full(display).grown(self.overscan);

@@ -44,7 +44,7 @@ impl Part for ConePart {
     fn anchor(rows: &Self::Rows, origin: &Vec3x8) -> Anchor {
         let ([tip, axis], [height, radius, slope]) = *rows;
         let f = tip - *origin;
-        let error = roundings(4.0).mul_add((tip.abs() + f.abs()).sum(), float8(VANISHING));
+        let error = roundings(5.0).mul_add((tip.abs() + f.abs()).sum(), float8(VANISHING));
         Anchor { f, error, axis, height, radius, slope }
     }
 

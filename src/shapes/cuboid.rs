@@ -33,9 +33,10 @@ impl Part for BoxPart {
     #[inline(always)]
     fn anchor(rows: &Self::Rows, origin: &Vec3x8) -> Anchor {
         let (min, max) = (rows[0] - *origin, rows[1] - *origin);
-        // Corners round with the scene, the difference once; a quotient three times, the direction's rounding included.
-        let corner = (rows[0].abs() + rows[1].abs()) * roundings(2.5);
-        Anchor { min, max, error: corner + (min.abs() + max.abs()) * roundings(5.5) }
+        // Corners round with the scene, origins with the camera by no more than corners and differences do, the difference
+        // once; a quotient three times, the direction's rounding included.
+        let corner = (rows[0].abs() + rows[1].abs()) * roundings(3.5);
+        Anchor { min, max, error: corner + (min.abs() + max.abs()) * roundings(6.5) }
     }
 
     #[inline(always)]

@@ -43,7 +43,7 @@ impl Part for CylinderPart {
     fn anchor(rows: &Self::Rows, origin: &Vec3x8) -> Anchor {
         let ([base, axis], [height, radius]) = *rows;
         let f = base - *origin;
-        let error = roundings(6.0).mul_add((base.abs() + f.abs()).sum() + height, float8(VANISHING));
+        let error = roundings(7.0).mul_add((base.abs() + f.abs()).sum() + height, float8(VANISHING));
         let slip = roundings(13.0).mul_add(f.abs().sum(), error);
         Anchor { f, axis, height, r2: radius * radius, error, slip }
     }

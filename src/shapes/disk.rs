@@ -72,7 +72,7 @@ impl Part for DiskPart {
         let mut doubt = Mask8::NONE;
         if CERTIFY {
             // The error of t moves x along the ray; the rest is what center, origin and direction round by.
-            let shift = crossing.error.mul_add(length, roundings(4.0).mul_add(anchor.reach, float8(VANISHING)));
+            let shift = crossing.error.mul_add(length, roundings(5.0).mul_add(anchor.reach, float8(VANISHING)));
             let near_rim = |r: Float8| {
                 let shift = roundings(8.0).mul_add(r, shift);
                 Mask8::le((rho2 - r * r).abs(), shift * (r + r + shift) * Float8::splat(1.25))

@@ -99,12 +99,13 @@ impl Part for PlanePart {
 /// The bounds of planes.
 const EVERYWHERE: (Vec3x8, Vec3x8) = (Vec3x8::constant(f32::NEG_INFINITY), Vec3x8::constant(f32::INFINITY));
 
-/// The error of `n . f`, where f goes from the ray's origin to `anchor`: the anchor rounds with the scene, f with the
-/// subtraction, the normal and the products each once, the sum three times.
+/// The error of `n . f`, where f goes from the ray's origin to `anchor`: the anchor rounds with the scene, the origin with
+/// the camera by no more than both others do, f with the subtraction, the normal and the products each once, the sum
+/// three times.
 #[inline(always)]
 pub(super) fn height_error(normal: Vec3x8, anchor: Vec3x8, f: Vec3x8) -> Float8 {
     let (anchor, f) = (anchor.abs(), f.abs());
-    normal.abs().dot(f * roundings(9.0) + anchor * roundings(2.5))
+    normal.abs().dot(f * roundings(10.0) + anchor * roundings(3.5))
 }
 
 /// Where eight rays cross eight planes.

@@ -61,9 +61,9 @@ impl<const N: usize> Part for PolygonPart<N> {
     fn anchor(((rows, _), _): &Self::Rows, origin: &Vec3x8) -> Anchor {
         let [center, normal] = *rows;
         let f = center - *origin;
-        // The center rounds with the scene, f and t dir with every operation, where t dir is as long as f and the way
+        // The center rounds with the scene, the origin with the camera, f and t dir with every operation, where t dir is as long as f and the way
         // from the center together.
-        let slip = roundings(6.0).mul_add(f.abs().sum(), roundings(3.0).mul_add(center.abs().sum(), float8(VANISHED)));
+        let slip = roundings(7.0).mul_add(f.abs().sum(), roundings(4.0).mul_add(center.abs().sum(), float8(VANISHED)));
         Anchor { f, height: normal.dot(f), error: height_error(normal, center, f), slip }
     }
 

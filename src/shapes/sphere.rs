@@ -42,14 +42,14 @@ impl Part for SpherePart {
         let f = center - *origin;
         let (ff, r2) = (f.dot(f), radius * radius);
         let c = ff - r2;
-        // The center rounds with the scene, f with the subtraction, and the direction moves the ray by a rounding
-        // of f beside the center; 1-norms stand for lengths.
+        // The center rounds with the scene, the origin with the camera by no more than both others do, f with the
+        // subtraction, and the direction moves the ray by a rounding of f beside the center; 1-norms stand for lengths.
         let (from, to) = (center.abs().sum(), f.abs().sum());
         let reach = from + to;
         let far = roundings(6.0) * reach;
-        let bound = roundings(24.0) * r2 + roundings(4.5) * radius * reach + far.mul_add(far, float8(VANISHED));
-        // 13 of it for the closest approach; the nearer root takes as many again from c over z.
-        let slip = roundings(26.0).mul_add(to, roundings(8.0) * from);
+        let bound = roundings(24.0) * r2 + roundings(6.5) * radius * reach + far.mul_add(far, float8(VANISHED));
+        // 14 of it for the closest approach; the nearer root takes as many again from c over z.
+        let slip = roundings(28.0).mul_add(to, roundings(10.0) * from);
         Anchor { f, r2, c, near: Mask8::lt(c.abs(), r2), bound, slip }
     }
 
@@ -102,7 +102,8 @@ impl Part for SpherePart {
             (entry_error, exit_error) = (error, error);
             if close.any() {
                 // Here c is as good as its own rounding, and so is the smaller root, whose sign is certain.
-                let small = b.abs() * (error / a.abs() + roundings(4.0));
+                let lift = roundings(2.0) * f.abs().sum() * rays.origin.abs().sum();
+                let small = b.abs() * (error / a.abs() + roundings(4.0)) + lift / z.abs();
                 let small = close.select(small.fast_min(error), error);
                 let first = Mask8::lt(a, b);
                 (entry_error, exit_error) = (first.select(error, small), first.select(small, error));

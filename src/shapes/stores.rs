@@ -166,22 +166,23 @@ impl Stores {
             left &= others;
         }
         if surface.vague.any() && self.certify {
-            self.tell_faces(&hits, (rays, t), exact, &mut surface);
+            self.sharpen(surface.vague, &hits, (rays, t), exact, &mut surface);
         }
         (surface, owners)
     }
 
-    /// Takes from f64 what is vague.
+    /// Takes some lanes of a surface from f64, of rays before they were rounded where those are given.
     #[cold]
     #[inline(never)]
-    fn tell_faces(
+    pub fn sharpen(
         &self,
+        lanes: Mask8,
         hits: &[f32; LANES],
         (rays, t): (&RayPacket, Float8),
         exact: Option<&ExactPacket>,
         surface: &mut Surface8,
     ) {
-        for lane in surface.vague.lanes() {
+        for lane in lanes.lanes() {
             let ray = Ray64::exact(&rays.lane(lane));
             let ray = exact.map_or(ray, |exact| ray.from(exact, lane));
             if let Some(found) = self.refine(RowRef::from_lane(hits[lane]), &ray, f64::from(t.as_array()[lane])) {

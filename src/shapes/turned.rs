@@ -39,8 +39,9 @@ impl Part for TurnedBoxPart {
         let ([center, half], axes) = *rows;
         let from = center - *origin;
         let f = local(&axes, from);
-        // The center rounds with the scene, the difference once, its turning five times; then it is added and divided.
-        let moved = roundings(2.5) * center.abs().sum() + roundings(7.0) * from.abs().sum();
+        // The center rounds with the scene, the origin with the camera, the difference once, its turning five times; then it
+        // is added and divided.
+        let moved = roundings(3.5) * center.abs().sum() + roundings(8.0) * from.abs().sum();
         let error = (f.abs() + half) * roundings(6.0) + Vec3x8::new(moved, moved, moved);
         Anchor { min: f - half, max: f + half, error, axes }
     }
