@@ -1,6 +1,8 @@
 //! The unit of scheduling: a small square of pixels, all of their samples.
 
+use std::mem::take;
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 
 use super::adaptive::{Effort, Noise};
 use super::coverage::Coverage;
@@ -94,12 +96,12 @@ impl Block {
         record: &mut R,
         stop: impl Fn() -> bool,
     ) -> Option<BlockWork> {
-        let (window, View { rays, coverage }) = (self.window, *view);
+        let (window, View { rays, coverage, rooms }) = (self.window, *view);
         let sums = vec![[0f64; 4]; window.area()];
         let may_pass = coverage.is_some() && record.passes_blanks();
         let blank = if may_pass { direct.blank() } else { None };
         let before = (Counts::default(), RayCounts::default());
-        let room = Room::default();
+        let room = rooms.take();
         let mut work = Work { rays, direct, record, sums, room, before, tiles: 0, background_tiles: 0 };
         let draws = R::ON || rays.draws() || direct.draws();
         let (mut batch, mut blank_samples) = (Batch::default(), 0);
@@ -133,18 +135,12 @@ impl Block {
         let pixels = work.sums.into_iter().map(|sum| sum.map(|x| (x * share) as f32)).collect();
         let blank_tiles = blank_samples.div_ceil(WAVE as u64);
         let (tiles, background_tiles) = (work.tiles + blank_tiles, work.background_tiles + blank_tiles);
-        let Room { walk, rays, mut left_out, .. } = work.room;
+        let mut room = work.room;
+        let (tests, rays) = (take(&mut room.walk.counts), take(&mut room.rays));
+        let mut left_out = take(&mut room.left_out);
+        rooms.give(room);
         left_out[Skip::Background] += blank_samples;
-        Some(BlockWork {
-            pixels,
-            layers: None,
-            rays,
-            tests: walk.counts,
-            left_out,
-            tiles,
-            background_tiles,
-            effort: None,
-        })
+        Some(BlockWork { pixels, layers: None, rays, tests, left_out, tiles, background_tiles, effort: None })
     }
 
     /// Those of the pixels of a whole square that lie in this part of it.
@@ -169,7 +165,7 @@ impl Block {
         let draw = |half: usize, range: Range<u32>| match &mut sum {
             None => {
                 let mut work = whole.trace(&views[half], direct, range, record, stop)?;
-                let pixels = std::mem::take(&mut work.pixels);
+                let pixels = take(&mut work.pixels);
                 sum = Some(work);
                 Some(pixels)
             }
@@ -209,6 +205,22 @@ pub struct View<'a> {
     pub rays: &'a CameraRays,
     /// What of the picture may see anything; without, all of it.
     pub coverage: Option<&'a Coverage>,
+    /// Room for the work.
+    pub rooms: &'a Rooms,
+}
+
+/// Room for work on blocks: a thread takes one and brings it back, which is cheaper than making one for each block.
+#[derive(Debug, Default)]
+pub struct Rooms(Mutex<Vec<Room>>);
+
+impl Rooms {
+    fn take(&self) -> Room {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default()
+    }
+
+    fn give(&self, room: Room) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(room);
+    }
 }
 
 /// Work on a block.

@@ -27,7 +27,7 @@ pub use self::stats::Stats;
 pub use self::task::{Task, Traced};
 
 use self::adaptive::Noise;
-use self::block::{Block, View};
+use self::block::{Block, Rooms, View};
 use self::coverage::Coverage;
 use crate::accel::Tree;
 use crate::film::{Picture, Window};
@@ -445,6 +445,7 @@ pub struct Frame<'s> {
     tree: Tree,
     lamps: Lamps<'s>,
     coverage: Option<Coverage>,
+    rooms: Rooms,
     rays: CameraRays,
     /// Those of the other half of the samples, to a noise level.
     other_rays: Option<CameraRays>,
@@ -486,6 +487,7 @@ impl<'s> Frame<'s> {
             tree,
             lamps,
             coverage,
+            rooms: Rooms::default(),
             rays,
             other_rays,
             noise,
@@ -519,7 +521,7 @@ impl<'s> Frame<'s> {
     }
 
     fn view(&self) -> View<'_> {
-        View { rays: &self.rays, coverage: self.coverage.as_ref() }
+        View { rays: &self.rays, coverage: self.coverage.as_ref(), rooms: &self.rooms }
     }
 
     /// Of each half of the samples, to a noise level.

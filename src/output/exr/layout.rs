@@ -157,19 +157,24 @@ impl Source<'_> {
 
     /// What the type of the channel does not hold.
     pub fn losses(&self) -> Losses {
-        let count = |half: bool, samples: &mut dyn Iterator<Item = f32>| {
-            samples.fold(Losses::default(), |losses, sample| Losses {
-                dropped: losses.dropped + u64::from(!sample.is_finite()),
-                clamped: losses.clamped + u64::from(half && sample.is_finite() && sample.abs() > HALF_MAX),
-            })
-        };
         match *self {
-            Source::Color { pixels, slot, float } => count(!float, &mut pixels.iter().map(|pixel| pixel[slot])),
-            Source::Half(samples) => count(true, &mut samples.iter().copied()),
-            Source::Float(samples) => count(false, &mut samples.iter().copied()),
+            Source::Color { pixels, slot, float } => losses(!float, pixels.iter().map(|pixel| pixel[slot])),
+            Source::Half(samples) => losses(true, samples.iter().copied()),
+            Source::Float(samples) => losses(false, samples.iter().copied()),
             Source::Uint(_) => Losses::default(),
         }
     }
+}
+
+/// Samples that are not finite, and those that a half does not hold.
+fn losses(half: bool, samples: impl Iterator<Item = f32>) -> Losses {
+    let limit = if half { HALF_MAX } else { f32::MAX };
+    let (dropped, beyond) = samples.fold((0u64, 0u64), |(dropped, beyond), sample| {
+        let size = sample.abs();
+        // NaN is not beyond anything.
+        (dropped + u64::from(!sample.is_finite()), beyond + u64::from(size > limit && size < f32::INFINITY))
+    });
+    Losses { dropped, clamped: beyond }
 }
 
 /// Rounding to the nearest half would turn 65520 and more into infinity.

@@ -195,7 +195,8 @@ fn pack(picture: &Picture, parts: &[Part<'_>], headers: &[Header]) -> Result<Vec
         }
         Ok(Packed { index, chunk, digests })
     };
-    blocks.into_par_iter().map_init(Packer::new, one).collect()
+    // Each state takes as long to make as some lines to pack.
+    blocks.into_par_iter().with_min_len(32).map_init(Packer::new, one).collect()
 }
 
 /// A block as it is stored.
