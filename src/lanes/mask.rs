@@ -86,7 +86,8 @@ impl Mask8 {
     /// Lanes whose sign bit is set, -0 and negative NaN among them.
     #[inline(always)]
     pub fn sign(a: Float8) -> Self {
-        Mask8(a)
+        // AVX chooses by the sign bit alone, whatever the others are; before it lanes are chosen bit by bit.
+        if cfg!(target_feature = "avx") { Mask8(a) } else { Mask8(cast(cast::<_, i32x8>(a).simd_lt(i32x8::ZERO))) }
     }
 }
 
