@@ -375,3 +375,34 @@ fn layers_hold_nothing_that_spreads() {
     }
     assert!(scenes > 6, "{scenes}");
 }
+
+/// Margins are large in the middle of what is seen and fall toward its rims, below 8 where f64 had to decide: from far
+/// away more of them. Both engines tell the same.
+#[test]
+fn margins_tell_what_f32_could_not() {
+    let mut scene = scene();
+    scene.objects.retain(|object| object.name.as_deref() == Some("ball"));
+    scene.clouds.clear();
+    let layers = Layers::default().with(Aov::Margin).with(Aov::Ids);
+    let both = |scene: &Scene, slack: f32| {
+        let [ours, theirs] = [Engine::Packet, Engine::Reference]
+            .map(|engine| render(scene, layers, |renderer| renderer.spp(1).engine(engine)).picture);
+        let (ours, theirs) = (floats(&ours, "margin.Y").to_vec(), floats(&theirs, "margin.Y").to_vec());
+        // Far away coordinates are relative to other places, and so are their roundings.
+        let close = |(a, b): (&f32, &f32)| (a - b).abs() <= slack * b.abs().max(8.0);
+        assert!(ours.iter().zip(&theirs).all(close));
+        ours
+    };
+    let seen = |margins: &[f32]| margins.iter().copied().filter(|margin| *margin < 1e10).collect::<Vec<_>>();
+    let near = both(&scene, 1e-3);
+    let ball = seen(&near);
+    assert!(ball.len() > 100 && near.len() > ball.len() && near.contains(&1e10));
+    let (least, most) = (ball.iter().copied().fold(f32::MAX, f32::min), ball.iter().copied().fold(0.0, f32::max));
+    assert!(least > 8.0 && most > 1e5 && least < 0.2 * most, "{least} {most}");
+    let camera = &mut scene.cameras[0];
+    camera.eye = camera.target + (camera.eye - camera.target) * 1e5;
+    camera.lens = octray::scene::Lens::Pinhole { vfov: 40.0 / 1e5 };
+    let ball = seen(&both(&scene, 1.0));
+    let open = ball.iter().filter(|margin| **margin < 8.0).count();
+    assert!(ball.len() > 100 && open > 5 && open < ball.len(), "{open} of {}", ball.len());
+}

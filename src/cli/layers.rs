@@ -11,7 +11,7 @@ use super::exit::{Exit, Failure};
 /// Which layers there are beside the colour.
 #[derive(Debug, Clone, Args)]
 pub struct LayerArgs {
-    /// Layers beside the colour, in place of the scene's: depth, position, normal, albedo, uv, motion, ids, samples, variance,
+    /// Layers beside the colour, in place of the scene's: depth, position, normal, albedo, uv, motion, ids, samples, variance, margin,
     /// crypto_object, crypto_material, crypto_asset, cryptomatte (those three), all
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     aov: Vec<String>,

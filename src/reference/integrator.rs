@@ -73,6 +73,8 @@ pub struct First {
     pub albedo: DVec3,
     /// As the shape's doc comment says.
     pub uv: DVec2,
+    /// How far the decision is from turning, in errors that f32 cannot avoid: [`Reference::margin`].
+    pub margin: f64,
 }
 
 /// Rays by kind.
@@ -250,6 +252,7 @@ impl Walk<'_> {
                 normal: side.n,
                 albedo: reflectance(&material.model, color),
                 uv: hit.uv,
+                margin: self.tracer.margin(&step.ray, hit.primitive, hit.t).unwrap_or(0.0),
             });
         }
         let onward = onward(&material.model, color, &side, hit.front);

@@ -34,6 +34,7 @@ use crate::film::{Picture, Window};
 use crate::integrate::{CameraRays, Direct, Lamps, RayCounts, Record};
 use crate::output::{self, Description, Losses, Options, OutputError};
 use crate::plan::{InvalidScene, Plan, Sight, Skip, SkipSet, validate};
+use crate::reference::Reference;
 use crate::sample;
 use crate::scene::{Aov, Camera, ImageSettings, Integrator, Layers, RenderSettings, Scene, SceneSum};
 
@@ -446,6 +447,8 @@ pub struct Frame<'s> {
     lamps: Lamps<'s>,
     coverage: Option<Coverage>,
     rooms: Rooms,
+    /// Tells margins, where those are asked for.
+    judge: Option<Reference>,
     rays: CameraRays,
     /// Those of the other half of the samples, to a noise level.
     other_rays: Option<CameraRays>,
@@ -473,6 +476,9 @@ impl<'s> Frame<'s> {
             true => Coverage::new(&tree, camera, plan.origin, display, renderer.reach()),
             false => None,
         };
+        let asks =
+            renderer.layers.has(Aov::Margin) || (renderer.layers.is_empty() && !renderer.skips.has(Skip::Layers));
+        let judge = asks.then(|| Reference::relative_to(renderer.scene, plan.origin));
         let build_seconds = start.elapsed().as_secs_f64() - plan_seconds;
         let seed = renderer.settings.seed;
         let noise = renderer.noise_level();
@@ -488,6 +494,7 @@ impl<'s> Frame<'s> {
             lamps,
             coverage,
             rooms: Rooms::default(),
+            judge,
             rays,
             other_rays,
             noise,

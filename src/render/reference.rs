@@ -2,9 +2,9 @@
 
 use std::time::Instant;
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 
-use super::layers::{LayerPlan, LayerWork, Near, Sums};
+use super::layers::{LayerPlan, LayerWork, Near, Place, Sums};
 use super::{Renderer, Stats, shutter};
 use crate::film::{Picture, Window};
 use crate::integrate::{RayCounts, RayKind};
@@ -132,10 +132,10 @@ fn nearest(pixel: &Pixel) -> Option<usize> {
     samples.min_by(|a, b| a.1.distance.total_cmp(&b.1.distance)).map(|(sample, _)| sample)
 }
 
-/// The point in the world and the texture coordinates that the nearest sample sees.
-fn place(pixel: &Pixel, origin: DVec3) -> (DVec3, DVec2) {
+/// Where the nearest sample sees something.
+fn place(pixel: &Pixel, origin: DVec3) -> Place {
     let first = nearest(pixel).and_then(|sample| pixel.samples[sample].first.as_ref());
-    first.map_or_else(Default::default, |first| (first.point + origin, first.uv))
+    first.map_or(Place::NONE, |first| Place { point: first.point + origin, uv: first.uv, margin: first.margin })
 }
 
 pub(super) fn add(counts: &mut RayCounts, pixel: &Pixel) {

@@ -22,6 +22,9 @@ pub enum Aov {
     Samples,
     /// Variance of the pixel's mean, estimated from its samples; 0 where there is but one.
     Variance,
+    /// How far the decision that the ray meets what is seen is from turning, in errors that f32 cannot avoid: below 8 it was
+    /// made in f64. At most 1e10, and 1e10 on a miss.
+    Margin,
     /// Box tests, primitive tests and the share of live lanes.
     Cost,
     /// Cryptomatte of objects.
@@ -34,7 +37,7 @@ pub enum Aov {
 
 impl Aov {
     /// All of them, by their number.
-    pub const ALL: [Aov; 13] = [
+    pub const ALL: [Aov; 14] = [
         Aov::Depth,
         Aov::Position,
         Aov::Normal,
@@ -44,6 +47,7 @@ impl Aov {
         Aov::Ids,
         Aov::Samples,
         Aov::Variance,
+        Aov::Margin,
         Aov::Cost,
         Aov::CryptoObject,
         Aov::CryptoMaterial,
@@ -65,6 +69,7 @@ impl Aov {
             Aov::Ids => "ids",
             Aov::Samples => "samples",
             Aov::Variance => "variance",
+            Aov::Margin => "margin",
             Aov::Cost => "cost",
             Aov::CryptoObject => "crypto_object",
             Aov::CryptoMaterial => "crypto_material",
@@ -121,7 +126,7 @@ impl Layers {
         Layers { set: self.set | 1 << aov as u8, ..self }
     }
 
-    /// With those of a name: of one [`Aov`], "cryptomatte" for three, or "all" for all but "cost".
+    /// With those of a name: of one [`Aov`], "cryptomatte" for three, or "all" for all but "margin" and "cost".
     ///
     /// # Errors
     /// The name is unknown; says which are known.
@@ -175,7 +180,7 @@ mod tests {
         let some = named(&["ids", "depth", "ids"]).unwrap();
         assert_eq!(some.iter().collect::<Vec<_>>(), [Aov::Depth, Aov::Ids]);
         let all = named(&["all"]).unwrap();
-        assert!(Aov::ALL.into_iter().all(|aov| all.has(aov) == (aov != Aov::Cost)));
+        assert!(Aov::ALL.into_iter().all(|aov| all.has(aov) != matches!(aov, Aov::Margin | Aov::Cost)));
         assert_eq!(named(&["cryptomatte"]).unwrap().iter().collect::<Vec<_>>(), Aov::CRYPTOMATTES);
         for (number, aov) in Aov::ALL.into_iter().enumerate() {
             assert_eq!((aov as usize, named(&[aov.name()])), (number, Ok(Layers::default().with(aov))));

@@ -18,7 +18,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 pub(super) use self::near::Near;
-pub(super) use self::sums::{LayerWork, Sums};
+pub(super) use self::sums::{LayerWork, Place, Sums};
 pub(super) use self::tape::LayerTape;
 
 use super::{Renderer, shutter};
@@ -27,6 +27,9 @@ use crate::scene::{Aov, Camera, Layers, Objects, Scene, carried};
 
 /// The depth of a miss: finite, so that filters do not spread infinity.
 pub(super) const MISS_DEPTH: f32 = 1e10;
+
+/// The margin of a miss, and the most that one is: finite as well.
+pub(super) const MOST_MARGIN: f64 = 1e10;
 
 /// What the layers of one frame need to know of its scene.
 #[derive(Debug)]
@@ -131,6 +134,7 @@ impl<'s> LayerPlan<'s> {
             Aov::Ids => named(&["id.object", "id.material"], Kind::Uint),
             Aov::Samples => some("samples", "Y", Kind::Float),
             Aov::Variance => some("variance", "RGB", Kind::Float),
+            Aov::Margin => some("margin", "Y", Kind::Float),
             Aov::Cost => named(&["cost.box", "cost.prim", "cost.lanes"], Kind::Float),
             Aov::CryptoObject | Aov::CryptoMaterial | Aov::CryptoGroup => {
                 let layers = 0..self.layers.ranks / 2;

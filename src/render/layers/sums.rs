@@ -2,9 +2,9 @@
 
 use glam::{DVec2, DVec3};
 
-use super::LayerPlan;
 use super::matte::{Rank, Tally, ranked};
 use super::near::{Batches, Near};
+use super::{LayerPlan, MOST_MARGIN};
 use crate::film::Samples;
 use crate::lanes::{Float8, LANES, Vec3x8};
 use crate::scene::Aov;
@@ -89,7 +89,7 @@ impl Sums {
             normal: Filtered::new(room(&[Aov::Normal])),
             albedo: Filtered::new(room(&[Aov::Albedo])),
             cost: vec![[0.0; 4]; room(&[Aov::Cost])],
-            near: vec![Near::NONE; room(&[Aov::Depth, Aov::Position, Aov::Uv, Aov::Motion, Aov::Ids])],
+            near: vec![Near::NONE; room(&[Aov::Depth, Aov::Position, Aov::Uv, Aov::Motion, Aov::Ids, Aov::Margin])],
             batches: vec![Batches::default(); room(&[Aov::Variance])],
             batch: Batches::size(spp),
             tallies: Aov::CRYPTOMATTES.map(|aov| layers.has(aov).then(|| Tally::new(pixels))),
@@ -121,11 +121,10 @@ impl Sums {
         }
     }
 
-    /// All channels. `place` gives the point in the world and the texture coordinates that the nearest sample of
-    /// a pixel sees.
-    pub fn finish(self, plan: &LayerPlan, place: impl Fn(usize, &Near) -> (DVec3, DVec2)) -> LayerWork {
+    /// All channels. `place` tells where the nearest sample of a pixel sees something.
+    pub fn finish(self, plan: &LayerPlan, place: impl Fn(usize, &Near) -> Place) -> LayerWork {
         let mut work = LayerWork { channels: Vec::new(), seen: Default::default() };
-        let wants_place = plan.layers.has_any(&[Aov::Position, Aov::Uv, Aov::Motion]);
+        let wants_place = plan.layers.has_any(&[Aov::Position, Aov::Uv, Aov::Motion, Aov::Margin]);
         let places: Vec<_> = match wants_place {
             true => self.near.iter().enumerate().map(|(pixel, near)| placed(near, || place(pixel, near))).collect(),
             false => Vec::new(),
@@ -133,14 +132,14 @@ impl Sums {
         for aov in plan.layers.iter() {
             match aov {
                 Aov::Depth => work.floats(self.near.iter().map(|near| near.depth)),
-                Aov::Position => (0..3).for_each(|k| work.floats(places.iter().map(|place| place.0[k] as f32))),
+                Aov::Position => (0..3).for_each(|k| work.floats(places.iter().map(|place| place.point[k] as f32))),
                 Aov::Normal => self.normal.means(self.spp).for_each(|mean| work.channels.push(mean)),
                 Aov::Albedo => self.albedo.means(self.spp).for_each(|mean| work.channels.push(mean)),
-                Aov::Uv => (0..2).for_each(|k| work.floats(places.iter().map(|place| place.1[k] as f32))),
+                Aov::Uv => (0..2).for_each(|k| work.floats(places.iter().map(|place| place.uv[k] as f32))),
                 Aov::Motion => {
                     let moves = self.near.iter().zip(&places).map(|(near, place)| match near.row {
                         RowRef::MISS => [0.0; 2],
-                        _ => plan.motion(near, place.0),
+                        _ => plan.motion(near, place.point),
                     });
                     let moves: Vec<_> = moves.collect();
                     (0..2).for_each(|k| work.floats(moves.iter().map(|way| way[k])));
@@ -151,6 +150,7 @@ impl Sums {
                     let all: Vec<_> = self.batches.iter().map(|batches| batches.variance(self.batch)).collect();
                     (0..3).for_each(|k| work.floats(all.iter().map(|variance| variance[k])));
                 }
+                Aov::Margin => work.floats(places.iter().map(|place| place.margin as f32)),
                 Aov::Cost => {
                     (0..2).for_each(|k| work.floats(self.cost.iter().map(|cost| cost[k] as f32)));
                     work.floats(self.cost.iter().map(|cost| (cost[2] / cost[3].max(1.0)) as f32));
@@ -194,7 +194,25 @@ impl LayerWork {
     }
 }
 
-/// What a miss has instead of a place.
-fn placed(near: &Near, place: impl FnOnce() -> (DVec3, DVec2)) -> (DVec3, DVec2) {
-    if near.row == RowRef::MISS { Default::default() } else { place() }
+/// Where a sample sees something.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::render) struct Place {
+    /// World coordinates.
+    pub point: DVec3,
+    pub uv: DVec2,
+    /// Of the decision, if that was asked for.
+    pub margin: f64,
+}
+
+impl Place {
+    /// What a miss has instead.
+    pub const NONE: Place = Place { point: DVec3::ZERO, uv: DVec2::ZERO, margin: MOST_MARGIN };
+}
+
+fn placed(near: &Near, place: impl FnOnce() -> Place) -> Place {
+    if near.row == RowRef::MISS {
+        return Place::NONE;
+    }
+    let place = place();
+    Place { margin: place.margin.clamp(-MOST_MARGIN, MOST_MARGIN), ..place }
 }

@@ -1,15 +1,14 @@
 //! From the engine's tiles to the layers of a block.
 
-use glam::{DVec2, DVec3};
-
 use super::LayerPlan;
 use super::near::Near;
-use super::sums::{LayerWork, Sums};
+use super::sums::{LayerWork, Place, Sums};
 use crate::accel::{Counts, PACKETS};
 use crate::film::Window;
 use crate::integrate::{RayCounts, RayKind, Record, Samples8, Seen, Silent, Summed, Taken};
 use crate::lanes::{Float8, LANES, Mask8, Ray, Vec3x8};
 use crate::plan::Owner;
+use crate::reference;
 use crate::render::{Frame, shutter};
 use crate::scene::Aov;
 use crate::shade::attributes;
@@ -198,9 +197,8 @@ impl Record for LayerTape<'_, '_> {
     }
 }
 
-/// The point in the world and the texture coordinates that the nearest sample of a pixel sees, in f64 from its ray
-/// before that was rounded.
-fn place(frame: &Frame, (x, y): (i32, i32), near: &Near) -> (DVec3, DVec2) {
+/// What the nearest sample of a pixel sees, in f64 from its ray before that was rounded.
+fn place(frame: &Frame, (x, y): (i32, i32), near: &Near) -> Place {
     let mut samples = Samples8::default();
     samples.set(0, (x, y), frame.rays.pattern(x, y), near.sample);
     let (origin, dir) = frame.rays.exact(&samples).lane(0);
@@ -210,5 +208,7 @@ fn place(frame: &Frame, (x, y): (i32, i32), near: &Near) -> (DVec3, DVec2) {
     let point = found.map_or(origin + dir * f64::from(near.t), |found| found.point);
     let owner = Owner { primitive: near.primitive, material: near.material };
     let uv = attributes::uv(&frame.plan, stores, near.row, owner, point);
-    (point + frame.plan.origin, uv)
+    let line = reference::Ray { origin, dir, t_min: ray.t_min, t_max: ray.t_max };
+    let margin = frame.judge.as_ref().and_then(|judge| judge.margin(&line, near.primitive as usize, f64::from(near.t)));
+    Place { point: point + frame.plan.origin, uv, margin: margin.unwrap_or(0.0) }
 }
