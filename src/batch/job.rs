@@ -8,7 +8,7 @@ use super::{LayerChoice, WindowChoice};
 use crate::output::{self, Description, Format, description};
 use crate::plan::SkipSet;
 use crate::render::{Engine, RenderError, Renderer, Stats};
-use crate::scene::particles::Look;
+use crate::scene::particles::{self, Look};
 use crate::scene::{Aov, Camera, Integrator, Scene};
 
 /// One picture.
@@ -86,6 +86,9 @@ pub struct Shard {
     pub of: u32,
 }
 
+/// Samples per pixel from which on the look of atoms without a scene has ambient occlusion: fewer rays show noise alone.
+const FEWEST: u32 = 4;
+
 impl Job {
     /// The frame of the scene.
     pub fn frame(&self) -> i64 {
@@ -112,6 +115,9 @@ impl Job {
         }
         if settings.noise.is_some() {
             renderer = renderer.noise(settings.noise);
+        }
+        if particles::Format::of(&self.scene).is_some() && renderer.image().spp < FEWEST {
+            renderer = renderer.flat_ambient();
         }
         if let Some(shutter) = settings.shutter {
             renderer = renderer.shutter(shutter);
@@ -196,7 +202,7 @@ pub fn stem(scene: &Path) -> String {
     let name = scene.file_name().unwrap_or_default().to_string_lossy();
     let name = name.strip_suffix(".gz").unwrap_or(&name);
     let kind = [".toml", ".nff"].iter().any(|ending| name.to_lowercase().ends_with(ending));
-    let known = kind || crate::scene::particles::Format::of(scene).is_some();
+    let known = kind || particles::Format::of(scene).is_some();
     let stem = if known { name.rsplit_once('.').map(|(stem, _)| stem) } else { None };
     stem.unwrap_or(name).to_owned()
 }

@@ -239,6 +239,12 @@ impl<'s> Renderer<'s> {
         self
     }
 
+    /// Lets ambient light reach everything, open or not.
+    pub fn flat_ambient(mut self) -> Self {
+        self.settings.ambient_occlusion = false;
+        self
+    }
+
     /// How long the shutter is open, as a share of the time to the next frame; what [`moments`](Renderer::moments) the
     /// picture is of is another matter.
     pub fn shutter(mut self, share: f64) -> Self {
