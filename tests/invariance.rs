@@ -1,14 +1,17 @@
-//! What must not change a picture, not by a bit: threads, crops, engines, skipping, places.
+//! What must not change a picture, not by a bit: threads, order, crops, shards, engines, skipping, places.
 
 mod common;
 
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
 
 use common::*;
 use glam::{DVec2, DVec3};
+
+use octray::batch::Tile;
 use octray::film::{Picture, Window};
 use octray::plan::{Skip, SkipSet};
-use octray::render::{Engine, RenderError};
+use octray::render::{Engine, RenderError, Task};
 use octray::scene::*;
 use octray::{Progress, Renderer};
 
@@ -130,6 +133,36 @@ fn threads_change_nothing() {
     }
 }
 
+/// Blocks forward, backward and mixed up; and each tile of the picture by itself, in any order.
+#[test]
+fn the_order_of_blocks_and_shards_change_nothing() {
+    let scene = everything();
+    let renderer = Renderer::new(&scene).expect("complete").layers(Layers::default().with_named("all").expect("a set"));
+    let whole = renderer.render(&()).expect("a picture").picture;
+    let task = Task::new(&renderer).expect("a task");
+    let mut orders: Vec<Vec<usize>> = vec![(0..task.blocks()).rev().collect()];
+    let mut dice = Dice(5);
+    for _ in 0..2 {
+        let mut mixed: Vec<usize> = (0..task.blocks()).collect();
+        (1..mixed.len()).rev().for_each(|i| mixed.swap(i, dice.index(i + 1)));
+        orders.push(mixed);
+    }
+    assert!(task.blocks() > 4 && orders[1] != orders[2]);
+    for order in orders {
+        let traced = order.iter().map(|block| task.trace(*block, &|| false).expect("a block")).collect();
+        let picture = task.finish(traced, 1, Instant::now()).picture;
+        assert_eq!(differing(&whole, &picture), [], "{order:?}");
+        assert!(picture.channels == whole.channels, "{order:?}");
+    }
+    let shard = |index| {
+        let tile = Tile { columns: 3, rows: 2, index };
+        renderer.clone().crop(tile.window((97, 71))).render(&()).expect("a picture").picture
+    };
+    let joined = Picture::join(&[4, 1, 6, 2, 5, 3].map(shard)).expect("all of it");
+    assert_eq!(differing(&whole, &joined), []);
+    assert!(joined.channels == whole.channels);
+}
+
 #[test]
 fn crops_are_pieces_of_the_whole() {
     let scene = everything();
@@ -205,6 +238,24 @@ fn places_change_nothing() {
         let unlike = differing(&here, &there);
         assert!(unlike.is_empty(), "{by}: {} pixels, such as {:?}", unlike.len(), unlike[0]);
     }
+}
+
+/// The same through a lens so long that coordinates are relative to what is seen.
+#[test]
+fn places_change_nothing_from_afar() {
+    let mut scene = everything();
+    scene.objects.retain(|object| !matches!(object.shape, Shape::Plane(_)));
+    let camera = &mut scene.cameras[0];
+    let far = f64::from(1 << 16);
+    camera.eye += far * (camera.eye - camera.target);
+    camera.lens = Lens::Pinhole { vfov: 40.0 / far };
+    let here = picture(&Renderer::new(&scene).expect("complete"));
+    for by in [f64::from(1 << 20) * DVec3::X, f64::from(1 << 20) * DVec3::new(-1.0, 1.0, 1.0)] {
+        let moved = mapped(scene.clone(), |point| point + by);
+        assert_eq!(mapped(moved.clone(), |point| point - by).objects, scene.objects, "the move is exact");
+        assert_eq!(differing(&here, &picture(&Renderer::new(&moved).expect("complete"))), [], "{by}");
+    }
+    assert!(here.pixels.iter().filter(|pixel| pixel[0] > 0.0).count() > 500);
 }
 
 /// Stops after a while, and remembers how much was done.
