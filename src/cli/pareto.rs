@@ -21,7 +21,7 @@ Examples:
 #[command(
     after_help = EXAMPLES,
     long_about = "Measure run time against error\n\n\
-        Each scene is rendered in many ways: with 1, 2, 4, ... samples per pixel, by packets, by single rays and by the f64 \
+        Each scene is rendered in many ways: with 1, 2, 4, ... samples per pixel, to noise levels, by packets, by single rays and by the f64 \
         reference, without certification, with other filters, and with its spheres cut into about 1,000 and 10,000 triangles. CPU and wall seconds, RMSE, \
         relative MSE and the largest error, all against a converged picture, go to a CSV file, to plots, and to one page \
         for a browser that needs no other file. The front is marked: what nothing else beats in both time and error."
