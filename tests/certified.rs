@@ -200,6 +200,34 @@ fn the_place_of_a_hit_is_within_one_ulp() {
     assert!(met > 5000, "{met}");
 }
 
+/// Polygons that are cut into parts, and as little flat as the rules allow: all parts lie in the plane of the whole one.
+#[test]
+fn parts_of_a_polygon_share_its_plane() {
+    let (mut dice, mut met) = (Dice(17), 0);
+    for corners in [6, 30] {
+        for _ in 0..8 {
+            let turn = turn(&mut dice);
+            let corner = |k: usize| {
+                let (angle, radius) = (k as f64 * std::f64::consts::TAU / corners as f64, [1.0, 0.4][k % 2]);
+                turn * DVec3::new(radius * angle.cos(), radius * angle.sin(), 4e-5 * [1.0, -1.0, 0.3][k % 3])
+            };
+            let scene = scene_of([polygon((0..corners).map(corner))]);
+            let (tracer, reference) = (Tracer::new(&scene).expect("valid"), Reference::new(&scene));
+            for _ in 0..300 {
+                let origin = turn * (DVec3::new(0.0, 0.0, 5.0) + dice.in_cube(2.0));
+                let ray = ray(origin, dice.in_cube(0.5) - origin);
+                let (Some(hit), Some(want)) = (tracer.closest_hit(&ray), reference.closest(&exact(&ray))) else {
+                    continue;
+                };
+                let t = want.t as f32;
+                assert!((t.next_down()..=t.next_up()).contains(&hit.t), "{} for {}, {ray:?}", hit.t, want.t);
+                met += 1;
+            }
+        }
+    }
+    assert!(met > 1000, "{met}");
+}
+
 fn object_far(center: DVec3) -> Shape {
     sphere(center + DVec3::new(0.0, 30.0, 0.0), 1.0)
 }

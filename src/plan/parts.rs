@@ -126,7 +126,7 @@ pub struct PolygonPart<const N: usize> {
     pub corners: [DVec3; N],
     /// Unit, of the whole polygon.
     pub normal: DVec3,
-    /// First corner of the whole polygon.
+    /// First corner of the whole polygon, through which its plane goes.
     pub uv_origin: DVec3,
     /// Unit, along its first edge.
     pub uv_edge: DVec3,

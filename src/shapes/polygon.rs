@@ -27,7 +27,7 @@ impl<const N: usize> Part for PolygonPart<N> {
     type Anchor = Anchor;
 
     fn row(&self) -> (([DVec3; 2], [f64; 3]), [[f64; 3]; N]) {
-        let (first, normal) = (self.corners[0], self.normal);
+        let (first, normal) = (self.uv_origin, self.normal);
         let greatest = |of: &dyn Fn(DVec3) -> f64| self.corners.iter().map(|corner| of(*corner)).fold(0.0, f64::max);
         let warp = greatest(&|corner| normal.dot(corner - first).abs());
         let (low, high) = self.bounds();
@@ -115,7 +115,7 @@ impl<const N: usize> Part for PolygonPart<N> {
     fn decide(&self, ray: &Ray64, visible: Visible) -> Option<f64> {
         let a = self.corners.map(|corner| corner - ray.origin);
         let nd = self.normal.dot(ray.dir);
-        let t = self.normal.dot(a[0]) / nd;
+        let t = self.normal.dot(self.uv_origin - ray.origin) / nd;
         if !(t.is_finite() && ray.accepts(t) && shows(nd, visible)) {
             return None;
         }
@@ -128,7 +128,7 @@ impl<const N: usize> Part for PolygonPart<N> {
     }
 
     fn refine(&self, ray: &Ray64, _: f64, _: Visible) -> Surface64 {
-        flat_surface64(self.corners[0], self.normal, ray)
+        flat_surface64(self.uv_origin, self.normal, ray)
     }
 
     #[inline(always)]
@@ -148,8 +148,10 @@ impl<const N: usize> Part for PolygonPart<N> {
     }
 
     fn bounds(&self) -> (DVec3, DVec3) {
-        let corners = self.corners;
-        (corners.iter().copied().fold(corners[0], DVec3::min), corners.iter().copied().fold(corners[0], DVec3::max))
+        // Corners may lie a little beside the plane, in which rays meet the polygon.
+        let in_plane = |corner: &DVec3| corner - self.normal * self.normal.dot(corner - self.uv_origin);
+        let points = || self.corners.iter().copied().chain(self.corners.iter().map(in_plane));
+        (points().fold(DVec3::INFINITY, DVec3::min), points().fold(DVec3::NEG_INFINITY, DVec3::max))
     }
 
     fn owner(&self) -> Owner {
