@@ -271,12 +271,6 @@ impl RowRef {
         Kind::ALL.get((self.0 >> 28) as usize).copied()
     }
 
-    /// Whether it is of a kind.
-    #[inline(always)]
-    pub fn is_of(self, kind: Kind) -> bool {
-        self.0 >> 28 == kind as u32
-    }
-
     /// Whether it lies in a plane.
     #[inline(always)]
     pub fn is_flat(self) -> bool {
