@@ -149,8 +149,11 @@ fn the_order_of_blocks_and_shards_change_nothing() {
     }
     assert!(task.blocks() > 4 && orders[1] != orders[2]);
     for order in orders {
-        let traced = order.iter().map(|block| task.trace(*block, &|| false).expect("a block")).collect();
-        let picture = task.finish(traced, 1, Instant::now()).picture;
+        let mut unfinished = task.begin();
+        let gathering = unfinished.open(&task);
+        order.iter().for_each(|block| gathering.add(task.trace(*block, &|| false).expect("a block")));
+        drop(gathering);
+        let picture = task.finish(unfinished, 1, Instant::now()).picture;
         assert_eq!(differing(&whole, &picture), [], "{order:?}");
         assert!(picture.channels == whole.channels, "{order:?}");
     }

@@ -6,14 +6,16 @@
 //! were being traced.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::io;
+use std::path::PathBuf;
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
 use crate::film::{Channel, Cryptomatte, Picture, Samples, Window};
 use crate::output::{OutputError, aside};
-use crate::render::{Rendering, Task, Traced};
+use crate::render::{Gathering, Task, Unfinished};
 
 /// The first bytes of a file.
 const MAGIC: &[u8] = b"octray checkpoint 1\n";
@@ -27,15 +29,12 @@ pub struct Checkpoint {
     pub every: Duration,
 }
 
-/// A picture in the making, with the blocks that are in it.
-pub struct Partial {
+/// The checkpoint of a picture in the making.
+pub struct Saves<'c> {
+    to: &'c Checkpoint,
     /// What it must be of: scene, settings, size.
     key: String,
-    done: Vec<bool>,
-    waiting: Vec<(usize, Traced)>,
-    whole: Option<Rendering>,
-    start: Instant,
-    last: Instant,
+    last: Mutex<Instant>,
 }
 
 /// The head of a file, one line of JSON; samples follow: red, green, blue, alpha of each pixel, then each channel.
@@ -48,123 +47,67 @@ struct Head {
     /// Names of channels and their types: half, float, uint.
     channels: Vec<(String, char)>,
     cryptomattes: Vec<(String, BTreeMap<String, u32>)>,
-    object: BTreeMap<u32, String>,
-    material: BTreeMap<u32, String>,
 }
 
-impl Partial {
+impl<'c> Saves<'c> {
+    /// Of the picture with this key.
+    pub fn new(to: &'c Checkpoint, key: String) -> Self {
+        Saves { to, key, last: Mutex::new(Instant::now()) }
+    }
+
+    /// The file.
+    pub fn path(&self) -> PathBuf {
+        self.to.path.clone()
+    }
+
     /// Begins, or goes on from a file that is there and of the same picture.
     ///
     /// # Errors
     /// A file of another picture, or of none: what was found there.
-    pub fn open(path: &Path, key: String, task: &Task) -> Result<Self, String> {
-        let now = Instant::now();
-        let done = vec![false; task.blocks()];
-        let mut partial = Partial { key, done, waiting: Vec::new(), whole: None, start: now, last: now };
-        let bytes = match std::fs::read(path) {
+    pub fn open(&self, task: &Task) -> Result<Unfinished, String> {
+        let bytes = match std::fs::read(&self.to.path) {
             Ok(bytes) => bytes,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(partial),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(task.begin()),
             Err(error) => return Err(format!("cannot be read: {error}")),
         };
         let (head, mut picture) =
             decode(&bytes).ok_or("is no checkpoint, or not a whole one: remove it to begin anew")?;
-        if head.key != partial.key || head.done.len() != partial.done.len() {
-            return Err(
-                "is the checkpoint of another picture (scene, settings or size): remove it to begin anew".into()
-            );
+        let matte = |(name, manifest)| Cryptomatte { name, manifest };
+        picture.cryptomattes = head.cryptomattes.into_iter().map(matte).collect();
+        let unfinished = if head.key == self.key { task.go_on(picture, head.done) } else { None };
+        unfinished.ok_or_else(|| {
+            "is the checkpoint of another picture (scene, settings or size): remove it to begin anew".into()
+        })
+    }
+
+    /// Writes all that is done, where the last time is long enough ago.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write_if_due(&self, gathering: &Gathering) -> Result<(), OutputError> {
+        // While one thread writes, the others go on.
+        let Ok(mut last) = self.last.try_lock() else { return Ok(()) };
+        if last.elapsed() < self.to.every {
+            return Ok(());
         }
-        picture.cryptomattes =
-            head.cryptomattes.into_iter().map(|(name, manifest)| Cryptomatte { name, manifest }).collect();
-        let mut whole = task.finish(Vec::new(), 0, now);
-        (whole.names.object, whole.names.material) = (head.object, head.material);
-        whole.picture = picture;
-        partial.done = head.done;
-        partial.whole = Some(whole);
-        Ok(partial)
-    }
-
-    /// Whether a block is in it already.
-    pub fn has(&self, block: usize) -> bool {
-        self.done[block]
-    }
-
-    /// Takes a block in.
-    pub fn add(&mut self, block: usize, traced: Traced) {
-        self.waiting.push((block, traced));
-    }
-
-    /// Whether it is time to write.
-    pub fn is_due(&self, every: Duration) -> bool {
-        self.last.elapsed() >= every
+        self.write(gathering)?;
+        *last = Instant::now();
+        Ok(())
     }
 
     /// Writes all that is done.
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn write(&mut self, path: &Path, task: &Task) -> Result<(), OutputError> {
-        self.absorb(task, 0);
-        self.last = Instant::now();
-        let Some(whole) = &self.whole else { return Ok(()) };
-        aside::write(path, &encode(&self.key, &self.done, whole))
-    }
-
-    /// The finished picture.
-    pub fn finish(mut self, task: &Task, threads: usize) -> Rendering {
-        self.absorb(task, threads);
-        let mut whole = self.whole.unwrap_or_else(|| task.finish(Vec::new(), threads, self.start));
-        whole.stats.trace_seconds = self.start.elapsed().as_secs_f64();
-        whole.stats.threads = threads;
-        whole
-    }
-
-    /// Puts the blocks that wait into the picture.
-    fn absorb(&mut self, task: &Task, threads: usize) {
-        let waiting = std::mem::take(&mut self.waiting);
-        if waiting.is_empty() {
-            return;
-        }
-        let windows: Vec<Window> = waiting.iter().map(|(_, traced)| task.pixels(traced).0).collect();
-        let (blocks, traced): (Vec<usize>, Vec<Traced>) = waiting.into_iter().unzip();
-        blocks.iter().for_each(|block| self.done[*block] = true);
-        let part = task.finish(traced, threads, self.start);
-        let Some(whole) = &mut self.whole else {
-            self.whole = Some(part);
-            return;
-        };
-        windows.iter().for_each(|window| copy(&part.picture, &mut whole.picture, *window));
-        for (own, more) in whole.picture.cryptomattes.iter_mut().zip(part.picture.cryptomattes) {
-            own.manifest.extend(more.manifest);
-        }
-        whole.names.object.extend(part.names.object);
-        whole.names.material.extend(part.names.material);
-        // Counts of the parts add up only in the render itself: those of the larger one stand for the picture.
-        if part.stats.rays.rays.iter().sum::<u64>() > whole.stats.rays.rays.iter().sum::<u64>() {
-            whole.stats = part.stats;
-        }
+    pub fn write(&self, gathering: &Gathering) -> Result<(), OutputError> {
+        let so_far = gathering.so_far();
+        let done = so_far.done();
+        let picture = gathering.task().finish(so_far, 0, Instant::now()).picture;
+        aside::write(&self.to.path, &encode(&self.key, done, &picture))
     }
 }
 
-/// The pixels of a window, in colour and in all layers.
-fn copy(from: &Picture, to: &mut Picture, window: Window) {
-    for y in window.y0..window.y1 {
-        let Some(start) = to.window.index(window.x0, y) else { continue };
-        let row = start..start + window.width();
-        to.pixels[row.clone()].copy_from_slice(&from.pixels[row.clone()]);
-        for (own, other) in to.channels.iter_mut().zip(&from.channels) {
-            match (&mut own.samples, &other.samples) {
-                (Samples::Half(own), Samples::Half(other)) | (Samples::Float(own), Samples::Float(other)) => {
-                    own[row.clone()].copy_from_slice(&other[row.clone()]);
-                }
-                (Samples::Uint(own), Samples::Uint(other)) => own[row.clone()].copy_from_slice(&other[row.clone()]),
-                _ => {}
-            }
-        }
-    }
-}
-
-fn encode(key: &str, done: &[bool], whole: &Rendering) -> Vec<u8> {
-    let picture = &whole.picture;
+fn encode(key: &str, done: Vec<bool>, picture: &Picture) -> Vec<u8> {
     let kind = |channel: &Channel| match channel.samples {
         Samples::Half(_) => 'h',
         Samples::Float(_) => 'f',
@@ -173,13 +116,11 @@ fn encode(key: &str, done: &[bool], whole: &Rendering) -> Vec<u8> {
     let Window { x0, y0, x1, y1 } = picture.window;
     let head = Head {
         key: key.to_owned(),
-        done: done.to_vec(),
+        done,
         display: picture.display,
         window: [x0, y0, x1, y1],
         channels: picture.channels.iter().map(|channel| (channel.name.clone(), kind(channel))).collect(),
         cryptomattes: picture.cryptomattes.iter().map(|matte| (matte.name.clone(), matte.manifest.clone())).collect(),
-        object: whole.names.object.clone(),
-        material: whole.names.material.clone(),
     };
     let mut bytes = MAGIC.to_vec();
     // Names, numbers and flags: nothing that JSON cannot hold.

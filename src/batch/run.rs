@@ -15,14 +15,14 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
-use super::checkpoint::{Checkpoint, Partial};
+use super::checkpoint::{Checkpoint, Saves};
 use super::memory::{self, forecast};
 use super::source::{Shared, Ticket};
 use super::write::{Finished, Room, Writer, line};
 use super::{Event, Job, JobError, Report, Shard, Sources, Watch, annotate, existing, ledger};
 use crate::output::exr::Encoded;
 use crate::output::{self, Format, OutputError, aside};
-use crate::render::{RenderError, Renderer, Rendering, Task, Traced, moments, pool};
+use crate::render::{RenderError, Renderer, Rendering, Task, moments, pool};
 use crate::scene::inputs::{Hashes, hex, sha256};
 use crate::scene::{Aov, Scene};
 
@@ -305,11 +305,15 @@ impl Batch<'_> {
         self.large.fetch_add(total, Ordering::Relaxed);
         let waiting = AtomicU64::new(total);
         let stopped = || self.stopped();
-        let partial = self.resumed(job, &scene_hash, &task)?;
-        let of = |task: &Task| {
-            (0..task.blocks()).filter(|block| partial.as_ref().is_none_or(|kept| !lock(kept).has(*block)))
+        let saves = self.options.checkpoint.as_ref();
+        let saves = saves.map(|to| Saves::new(to, format!("{scene_hash} {}", ledger::settings_hash(job))));
+        let mut unfinished = match &saves {
+            None => task.begin(),
+            Some(saves) => saves.open(&task).map_err(|reason| JobError::Checkpoint { path: saves.path(), reason })?,
         };
-        let blocks: Vec<usize> = of(&task).collect();
+        let done = unfinished.done();
+        let blocks: Vec<usize> = (0..task.blocks()).filter(|block| !done[*block]).collect();
+        let gathering = unfinished.open(&task);
         let trace = |block| {
             let samples = task.samples(block);
             self.large.fetch_sub(samples, Ordering::Relaxed);
@@ -318,33 +322,22 @@ impl Batch<'_> {
                 return None;
             }
             let traced = task.trace(block, &stopped)?;
-            self.watch.event(&Event::Block(index, job, &renderer, &task, &traced));
+            gathering.show(&traced, |shown| self.watch.event(&Event::Block(index, job, &renderer, shown)));
+            gathering.add(traced);
             self.advance(samples as f64 / total as f64, index);
-            match &partial {
-                None => Some(Some(traced)),
-                Some(kept) => {
-                    self.keep(kept, block, traced, &task, index);
-                    Some(None)
-                }
+            if let Some(Err(error)) = saves.as_ref().map(|saves| saves.write_if_due(&gathering)) {
+                self.warn(index, error.to_string());
             }
+            Some(())
         };
-        let traced: Option<Vec<_>> = blocks.into_par_iter().map(trace).collect();
+        let traced: Option<()> = blocks.into_par_iter().map(trace).collect();
         self.large.fetch_sub(waiting.load(Ordering::Relaxed), Ordering::Relaxed);
-        let mut rendering = match (partial, traced) {
-            (None, traced) => {
-                let traced = traced.ok_or(JobError::Cancelled)?.into_iter().flatten().collect();
-                task.finish(traced, self.threads, start)
-            }
-            (Some(kept), Some(_)) => {
-                kept.into_inner().unwrap_or_else(PoisonError::into_inner).finish(&task, self.threads)
-            }
-            (Some(kept), None) => {
-                if let Some(checkpoint) = &self.options.checkpoint {
-                    lock(&kept).write(&checkpoint.path, &task)?;
-                }
-                return Err(JobError::Cancelled);
-            }
-        };
+        if let (None, Some(saves)) = (traced, &saves) {
+            saves.write(&gathering)?;
+        }
+        drop(gathering);
+        traced.ok_or(JobError::Cancelled)?;
+        let mut rendering = task.finish(unfinished, self.threads, start);
         let annotations = self.options.annotations.then(|| {
             let page = annotate::page(job, &renderer, scene, &rendering.picture, &rendering.names);
             (job.output.with_extension("json"), page.into_bytes())
@@ -355,27 +348,6 @@ impl Batch<'_> {
         let shard = self.options.shard.map(|shard| shard.to_string());
         let description = job.description(&renderer, &rendering.stats, Some(scene_hash), shard);
         Ok(Some((rendering, description, annotations)))
-    }
-
-    /// What a checkpoint has of a picture already; `None` where there is to be none.
-    fn resumed(&self, job: &Job, scene_hash: &str, task: &Task) -> Result<Option<Mutex<Partial>>, JobError> {
-        let Some(Checkpoint { path, .. }) = &self.options.checkpoint else { return Ok(None) };
-        let key = format!("{scene_hash} {}", ledger::settings_hash(job));
-        let partial = Partial::open(path, key, task);
-        let partial = partial.map_err(|reason| JobError::Checkpoint { path: path.clone(), reason })?;
-        Ok(Some(Mutex::new(partial)))
-    }
-
-    /// Takes a block into the checkpoint, and writes it where it is time.
-    fn keep(&self, kept: &Mutex<Partial>, block: usize, traced: Traced, task: &Task, index: usize) {
-        let Some(Checkpoint { path, every }) = &self.options.checkpoint else { return };
-        let mut kept = lock(kept);
-        kept.add(block, traced);
-        if kept.is_due(*every)
-            && let Err(error) = kept.write(path, task)
-        {
-            self.warn(index, error.to_string());
-        }
     }
 
     /// The moments that a picture is blurred over; none where nothing moves.

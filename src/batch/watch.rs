@@ -7,7 +7,7 @@ use thiserror::Error;
 use super::Job;
 use crate::film::Window;
 use crate::output::{EncodeError, Losses, OutputError};
-use crate::render::{IdNames, RenderError, Renderer, Rendering, Stats, Task, Traced};
+use crate::render::{IdNames, RenderError, Renderer, Rendering, Shown, Stats};
 use crate::scene::SceneErrors;
 
 /// Told how a batch goes on, and asked whether it is to go on. Called from any thread.
@@ -33,8 +33,8 @@ pub enum Event<'a> {
     FrameStart(usize, &'a Job),
     /// So much of all jobs is done, 0..1, and work on this one was the last.
     Progress(f64, usize, &'a Job),
-    /// A block of a job's picture was traced.
-    Block(usize, &'a Job, &'a Renderer<'a>, &'a Task<'a>, &'a Traced),
+    /// A block of a job's picture was traced and is about to be put among those before.
+    Block(usize, &'a Job, &'a Renderer<'a>, &'a Shown<'a>),
     /// The picture of a job is there, but not written yet.
     Traced(usize, &'a Job, &'a Rendering),
     /// The file of a job has its name.

@@ -6,13 +6,13 @@ use std::path::PathBuf;
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use octray::Renderer;
 use octray::batch::Job;
 use octray::film::Window;
 use octray::output::Format;
-use octray::render::{Rendering, Task, Traced};
+use octray::render::{Rendering, Shown};
 use tev_client::{PacketCreateImage, PacketUpdateImage, TevClient};
 
 use super::Run;
@@ -27,28 +27,21 @@ pub struct Preview<'a> {
     host: Option<&'a str>,
     tev: OnceLock<Option<Tev>>,
     run: &'a Run,
-    start: Instant,
-    so_far: Mutex<Vec<Traced>>,
 }
 
 impl<'a> Preview<'a> {
     /// With the viewer that the user asked for.
     pub fn new(run: &'a Run, host: Option<&'a str>) -> Self {
-        Preview { host, tev: OnceLock::new(), run, start: Instant::now(), so_far: Mutex::default() }
+        Preview { host, tev: OnceLock::new(), run }
     }
 
     /// Shows a block, and writes what there is so far where SIGUSR1 came.
-    pub fn block(&self, job: &Job, renderer: &Renderer, task: &Task, traced: &Traced) {
+    pub fn block(&self, job: &Job, renderer: &Renderer, shown: &Shown) {
         if let Some(tev) = self.tev.get_or_init(|| self.open(job, renderer)) {
-            let (window, pixels) = task.pixels(traced);
-            tev.show(window, pixels);
+            tev.show(shown.window, shown.pixels);
         }
-        let mut so_far = self.so_far.lock().unwrap_or_else(PoisonError::into_inner);
-        so_far.push(traced.clone());
         if self.run.signals.is_asked() {
-            let blocks = so_far.clone();
-            drop(so_far);
-            self.write(job, renderer, &task.finish(blocks, 0, self.start));
+            self.write(job, renderer, &(shown.so_far)());
         }
     }
 

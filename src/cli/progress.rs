@@ -184,9 +184,9 @@ impl Watch for Teller<'_> {
                 }));
             }
             Event::Progress(done, _, job) => self.progress(*done, job),
-            Event::Block(_, job, renderer, task, traced) => {
+            Event::Block(_, job, renderer, shown) => {
                 if let Some(preview) = &self.preview {
-                    preview.block(job, renderer, task, traced);
+                    preview.block(job, renderer, shown);
                 }
             }
             Event::Traced(index, job, rendering) => {

@@ -4,11 +4,13 @@
 //! [`crate::output`] takes and that every metric of [`crate::measure`] compares: colour, the [`Channel`]s
 //! beside it, and the names behind [`Cryptomatte`] ids. Files, curves and quantisation belong to `output`.
 
+mod band;
 mod channel;
 mod cryptomatte;
 mod join;
 mod picture;
 
+pub use self::band::Band;
 pub use self::channel::{Channel, Samples};
 pub use self::cryptomatte::Cryptomatte;
 pub use self::join::JoinError;

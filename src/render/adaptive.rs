@@ -33,6 +33,29 @@ pub struct Effort {
     pub met: bool,
 }
 
+/// What was spent on a tile, in numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spent {
+    /// Of all of its pixels.
+    samples: u64,
+    pixels: u64,
+    /// Sum of the values of all pixels and channels, and of the squares of their standard errors.
+    sum: f64,
+    squares: f64,
+    error: f64,
+    met: bool,
+}
+
+impl Effort {
+    /// All of it but what is said of single pixels.
+    pub fn spent(&self) -> Spent {
+        let pixels = self.variance.len() as u64;
+        let squares = self.variance.iter().flatten().map(|square| f64::from(*square)).sum();
+        let samples = pixels * u64::from(self.samples);
+        Spent { samples, pixels, sum: self.sum, squares, error: self.error, met: self.met }
+    }
+}
+
 /// What a render to a noise level came to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reached {
@@ -126,15 +149,14 @@ fn relative(squares: f64, sum: f64, count: usize) -> f64 {
 
 impl Reached {
     /// Sums up the tiles of a picture.
-    pub fn of<'a>(target: f64, tiles: impl Iterator<Item = &'a Effort>) -> Self {
+    pub fn of(target: f64, tiles: impl Iterator<Item = Spent>) -> Self {
         let mut reached = Reached { target, error: 0.0, worst: 0.0, short: 0, samples: 0, pixels: 0 };
         let (mut squares, mut sum) = (0.0, 0.0);
         for tile in tiles {
-            let pixels = tile.variance.len();
-            squares += tile.variance.iter().flatten().map(|square| f64::from(*square)).sum::<f64>();
+            squares += tile.squares;
             sum += tile.sum;
-            reached.pixels += pixels as u64;
-            reached.samples += pixels as u64 * u64::from(tile.samples);
+            reached.pixels += tile.pixels;
+            reached.samples += tile.samples;
             reached.short += u64::from(!tile.met);
             reached.worst = reached.worst.max(tile.error);
         }
@@ -186,7 +208,7 @@ mod tests {
         let parted = |half: usize, _| Some(vec![[half as f32; 4]; 10]);
         let (_, effort) = Noise::new(0.01, 16).sample(parted).unwrap();
         assert!(!effort.met && effort.samples == MOST && (effort.error - 1.0).abs() < 1e-12);
-        let reached = Reached::of(0.01, [&effort, &effort].into_iter());
+        let reached = Reached::of(0.01, [effort.spent(); 2].into_iter());
         assert!(reached.short == 2 && reached.samples == 20 * u64::from(MOST) && (reached.error - 1.0).abs() < 1e-6);
         assert!(Noise::new(0.01, 16).sample(|_, _| None).is_none());
     }

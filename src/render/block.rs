@@ -8,7 +8,7 @@ use super::adaptive::{Effort, Noise};
 use super::coverage::Coverage;
 use super::layers::LayerWork;
 use crate::accel::{Counts, PACKETS};
-use crate::film::{Picture, Window};
+use crate::film::Window;
 use crate::integrate::{
     CameraRays, Direct, PixelPattern, RayCounts, RayKind, Record, Room, Samples, Samples8, Silent, Summed, Taken, WAVE,
     Wave,
@@ -17,7 +17,7 @@ use crate::lanes::{LANES, Vec3x8};
 use crate::plan::{LeftOut, Skip};
 
 /// Pixels along an edge.
-const EDGE: i32 = 32;
+pub const EDGE: i32 = 32;
 
 /// A square of pixels that one thread renders.
 #[derive(Debug, Clone, Copy)]
@@ -186,15 +186,6 @@ impl Block {
         work.pixels = rows.iter().flat_map(|row| &work.pixels[row.clone()]).copied().collect();
         if let Some(layers) = &mut work.layers {
             layers.channels.iter_mut().for_each(|samples| *samples = samples.rows(&rows));
-        }
-    }
-
-    /// Puts the pixels where they belong.
-    pub fn copy_to(&self, pixels: &[[f32; 4]], picture: &mut Picture) {
-        for (row, y) in pixels.chunks(self.window.width()).zip(self.window.y0..) {
-            if let Some(start) = picture.window.index(self.window.x0, y) {
-                picture.pixels[start..start + row.len()].copy_from_slice(row);
-            }
         }
     }
 }

@@ -3,6 +3,7 @@
 mod adaptive;
 mod block;
 mod coverage;
+mod gather;
 mod layers;
 mod query;
 mod reference;
@@ -20,6 +21,7 @@ use rayon::ThreadPool;
 use rayon::prelude::*;
 
 pub use self::adaptive::Reached;
+pub use self::gather::{Gathering, Shown, Unfinished};
 pub use self::layers::IdNames;
 pub use self::query::{Answers, Batch, Query};
 pub use self::shutter::moments;
@@ -54,8 +56,8 @@ pub enum Engine {
 pub trait Progress: Sync {
     /// `done` of `total` samples are finished.
     fn advance(&self, done: u64, total: u64);
-    /// A block is done; [`Task::finish`] makes a picture of all those so far.
-    fn block(&self, _task: &Task, _traced: &Traced) {}
+    /// A block is done and about to be put into the picture.
+    fn block(&self, _shown: &Shown) {}
     /// Whether to stop as soon as possible.
     fn cancelled(&self) -> bool {
         false
@@ -398,18 +400,23 @@ impl<'s> Renderer<'s> {
                 stop.store(now, Ordering::Relaxed);
                 now
             };
+            let mut picture = task.begin();
+            let gathering = picture.open(&task);
             let trace = |block| {
                 if stopped() {
                     return None;
                 }
                 let traced = task.trace(block, &stopped)?;
-                progress.block(&task, &traced);
+                gathering.show(&traced, |shown| progress.block(shown));
+                gathering.add(traced);
                 let samples = task.samples(block);
                 progress.advance(done.fetch_add(samples, Ordering::Relaxed) + samples, task.total());
-                Some(traced)
+                Some(())
             };
-            let traced: Option<Vec<_>> = (0..task.blocks()).into_par_iter().map(trace).collect();
-            Ok(task.finish(traced.ok_or(RenderError::Cancelled)?, threads, start))
+            let traced: Option<()> = (0..task.blocks()).into_par_iter().map(trace).collect();
+            drop(gathering);
+            traced.ok_or(RenderError::Cancelled)?;
+            Ok(task.finish(picture, threads, start))
         })
     }
 
@@ -546,12 +553,10 @@ impl<'s> Frame<'s> {
         Direct::new(&self.plan, &self.tree, &self.lamps, self.settings.clone())
     }
 
-    fn stats(&self, threads: usize, trace_seconds: f64) -> Stats {
+    fn stats(&self) -> Stats {
         Stats {
-            threads,
             plan_seconds: self.plan_seconds,
             build_seconds: self.build_seconds,
-            trace_seconds,
             column_bytes: self.tree.stores().column_bytes(),
             tree_bytes: self.tree.bytes(),
             ..Stats::default()

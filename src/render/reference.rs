@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::layers::{LayerPlan, LayerWork, Near, Place, Sums};
 use super::{Renderer, Stats, shutter};
-use crate::film::{Picture, Window};
+use crate::film::Window;
 use crate::integrate::{RayCounts, RayKind};
 use crate::plan::Kind;
 use crate::reference::{EventKind, Pixel, Reference, View};
@@ -29,7 +29,7 @@ pub(super) struct Rows {
 pub(super) struct RowWork {
     row: usize,
     pub pixels: Vec<[f32; 4]>,
-    counts: RayCounts,
+    pub counts: RayCounts,
     pub layers: Option<LayerWork>,
 }
 
@@ -82,8 +82,8 @@ impl Rows {
         all
     }
 
-    pub fn stats(&self, threads: usize, trace_seconds: f64) -> Stats {
-        Stats { threads, plan_seconds: self.plan_seconds, trace_seconds, ..Stats::default() }
+    pub fn stats(&self) -> Stats {
+        Stats { plan_seconds: self.plan_seconds, ..Stats::default() }
     }
 }
 
@@ -92,13 +92,6 @@ impl RowWork {
     pub fn window(&self, window: Window) -> Window {
         let y0 = window.y0 + self.row as i32;
         Window { y0, y1: y0 + 1, ..window }
-    }
-
-    /// Puts the row where it belongs.
-    pub fn add_to(&self, picture: &mut Picture, stats: &mut Stats) {
-        let start = self.row * self.pixels.len();
-        picture.pixels[start..start + self.pixels.len()].copy_from_slice(&self.pixels);
-        stats.rays.add(&self.counts);
     }
 }
 

@@ -3,16 +3,14 @@
 //! [`Renderer::render`] gives all blocks to the threads of one pool; a batch hands out those of several pictures.
 
 use std::ops::Range;
-use std::sync::Arc;
-use std::time::Instant;
 
-use super::adaptive::{Effort, Noise, Reached};
+use super::adaptive::{Effort, Noise, Spent};
 use super::block::{Block, BlockWork};
-use super::layers::{LayerPlan, LayerTape};
+use super::layers::{LayerPlan, LayerTape, LayerWork};
 use super::reference::{RowWork, Rows};
 use super::tiles::{TileWork, Tiles};
-use super::{Engine, Frame, IdNames, RenderError, Renderer, Rendering, shutter};
-use crate::film::{Picture, Samples, Window};
+use super::{Engine, Frame, RenderError, Renderer, Stats, shutter};
+use crate::film::{Picture, Window};
 use crate::integrate::{Record, Silent};
 use crate::plan::Skip;
 use crate::scene::{Aov, Layers};
@@ -20,10 +18,10 @@ use crate::scene::{Aov, Layers};
 /// A picture whose tree is built and whose blocks wait for threads.
 pub struct Task<'s> {
     display: (u32, u32),
-    window: Window,
+    pub(super) window: Window,
     spp: u32,
     /// Relative error asked for.
-    target: Option<f64>,
+    pub(super) target: Option<f64>,
     work: Work<'s>,
     /// Where layers are asked for.
     layers: Option<LayerPlan<'s>>,
@@ -40,12 +38,16 @@ enum Work<'s> {
     Tiles(Box<Tiles>),
 }
 
-/// What a block came to; [`Task::finish`] puts it where it belongs. Copies share it.
-#[derive(Debug, Clone)]
-pub struct Traced(Arc<Part>);
+/// What a block came to; [`Gathering::add`](super::Gathering::add) puts it where it belongs.
+#[derive(Debug)]
+pub struct Traced {
+    /// Which one, from 0.
+    pub(super) block: usize,
+    part: Part,
+}
 
 #[derive(Debug)]
-#[allow(clippy::large_enum_variant)] // each lies behind a pointer of its own
+#[allow(clippy::large_enum_variant)] // there is one at a time
 enum Part {
     Block(Block, BlockWork),
     Row(RowWork),
@@ -53,33 +55,20 @@ enum Part {
 }
 
 impl Traced {
-    fn effort(&self) -> Option<&Effort> {
-        match &*self.0 {
-            Part::Block(_, work) => work.effort.as_ref(),
-            Part::Tile(tile) => Some(&tile.effort),
+    pub(super) fn spent(&self) -> Option<Spent> {
+        match &self.part {
+            Part::Block(_, work) => work.effort.as_ref().map(Effort::spent),
+            Part::Tile(tile) => Some(tile.effort.spent()),
             Part::Row(_) => None,
         }
     }
 
-    /// Puts samples and variances into the layers of these names.
-    fn tell_effort(&self, picture: &mut Picture) {
-        let Part::Block(block, BlockWork { effort: Some(effort), .. }) = &*self.0 else { return };
-        let (window, whole) = (picture.window, block.whole().window);
-        let inside: Vec<(usize, usize)> = (0..block.window.area())
-            .map(|index| block.window.pixel(index))
-            .filter_map(|(x, y)| window.index(x, y).zip(whole.index(x, y)))
-            .collect();
-        for channel in &mut picture.channels {
-            let Samples::Float(samples) = &mut channel.samples else { continue };
-            let name = channel.name.split('.').next().unwrap_or_default();
-            let part = ["R", "G", "B"].iter().position(|part| channel.name.ends_with(&format!(".{part}")));
-            for (to, from) in &inside {
-                match (name, part) {
-                    ("samples", _) => samples[*to] = effort.samples as f32,
-                    ("variance", Some(part)) => samples[*to] = effort.variance[*from][part],
-                    _ => {}
-                }
-            }
+    /// Adds its counts.
+    pub(super) fn count_in(&self, stats: &mut Stats) {
+        match &self.part {
+            Part::Block(_, work) => stats.add(work),
+            Part::Row(row) => stats.rays.add(&row.counts),
+            Part::Tile(tile) => stats.rays.add(&tile.counts),
         }
     }
 }
@@ -142,18 +131,18 @@ impl<'s> Task<'s> {
     pub fn trace(&self, block: usize, stop: &(dyn Fn() -> bool + Sync)) -> Option<Traced> {
         let part = match &self.work {
             Work::Blocks(frames, blocks) => {
-                let block = blocks[block];
-                Part::Block(block, self.trace_block(frames, &block, stop)?)
+                let place = blocks[block];
+                Part::Block(place, self.trace_block(frames, &place, stop)?)
             }
             Work::Rows(rows) => Part::Row(rows.trace(block, self.layers.as_ref(), stop)?),
             Work::Tiles(tiles) => Part::Tile(tiles.trace(block, stop)?),
         };
-        Some(Traced(Arc::new(part)))
+        Some(Traced { block, part })
     }
 
     /// Where a block lies, and its colour row by row.
     pub fn pixels<'t>(&self, traced: &'t Traced) -> (Window, &'t [[f32; 4]]) {
-        match &*traced.0 {
+        match &traced.part {
             Part::Block(block, work) => (block.window, &work.pixels),
             Part::Row(row) => (row.window(self.window), &row.pixels),
             Part::Tile(tile) => (tile.block.window, &tile.pixels),
@@ -227,53 +216,54 @@ impl<'s> Task<'s> {
             Some(plan) => {
                 let mut tape = LayerTape::new(frames, plan, whole.window.area());
                 let work = block.trace_until(noise, views, &direct, &mut tape, stop)?;
-                BlockWork { layers: Some(tape.finish(whole.window)), ..work }
+                let mut layers = tape.finish(whole.window);
+                work.effort.iter().for_each(|effort| plan.tell_effort(effort, &mut layers));
+                BlockWork { layers: Some(layers), ..work }
             }
         };
         block.cut(&whole, &mut work);
         Some(work)
     }
 
-    /// The picture of all blocks, whatever their order; `threads` and `start` (of tracing) are for its statistics.
-    pub fn finish(&self, traced: Vec<Traced>, threads: usize, start: Instant) -> Rendering {
-        let seconds = start.elapsed().as_secs_f64();
-        let mut picture = Picture::new(self.display, self.window);
-        let mut stats = match &self.work {
-            Work::Blocks(frames, _) => {
-                let first = frames[0].stats(threads, seconds);
-                frames[1..].iter().fold(first, |stats, frame| stats.prepared(&frame.stats(threads, seconds)))
-            }
-            Work::Rows(rows) => rows.stats(threads, seconds),
-            Work::Tiles(tiles) => tiles.stats(threads, seconds),
-        };
-        stats.noise = self.target.map(|target| Reached::of(target, traced.iter().filter_map(Traced::effort)));
-        for Traced(part) in &traced {
-            match &**part {
-                Part::Block(block, work) => {
-                    block.copy_to(&work.pixels, &mut picture);
-                    stats.add(work);
-                }
-                Part::Row(row) => row.add_to(&mut picture, &mut stats),
-                Part::Tile(tile) => {
-                    tile.block.copy_to(&tile.pixels, &mut picture);
-                    stats.rays.add(&tile.counts);
-                }
-            }
+    /// The layers that were asked for.
+    pub(super) fn asked(&self) -> Option<&LayerPlan<'s>> {
+        self.layers.as_ref().filter(|_| !self.unasked)
+    }
+
+    /// The layers of a block.
+    pub(super) fn layers<'t>(&self, traced: &'t Traced) -> Option<&'t LayerWork> {
+        match &traced.part {
+            Part::Block(_, work) => work.layers.as_ref(),
+            Part::Row(row) => row.layers.as_ref(),
+            Part::Tile(_) => None,
         }
+    }
+
+    /// Its picture without any block: all channels that were asked for, and nothing in them.
+    pub(super) fn blank(&self) -> Picture {
+        let mut picture = Picture::new(self.display, self.window);
+        if let Some(plan) = self.asked() {
+            plan.open(&mut picture);
+        }
+        picture
+    }
+
+    /// What is known before the first block.
+    pub(super) fn prepared(&self) -> Stats {
+        match &self.work {
+            Work::Blocks(frames, _) => {
+                let first = frames[0].stats();
+                frames[1..].iter().fold(first, |stats, frame| stats.prepared(&frame.stats()))
+            }
+            Work::Rows(rows) => rows.stats(),
+            Work::Tiles(tiles) => tiles.stats(),
+        }
+    }
+
+    /// Says what was left out, once all is counted.
+    pub(super) fn report_skips(&self, stats: &mut Stats) {
         if let Work::Blocks(frames, _) = &self.work {
             stats.skipped = frames[0].plan.skips.report(&stats.left_out);
         }
-        let mut names = IdNames::default();
-        if let Some(plan) = self.layers.as_ref().filter(|_| !self.unasked) {
-            let works = traced.iter().filter_map(|Traced(part)| match &**part {
-                Part::Block(block, work) => Some((block.window, work.layers.as_ref()?)),
-                Part::Row(row) => Some((row.window(self.window), row.layers.as_ref()?)),
-                Part::Tile(_) => None,
-            });
-            plan.add_to(works, &mut picture);
-            traced.iter().for_each(|traced| traced.tell_effort(&mut picture));
-            names = plan.names(&picture);
-        }
-        Rendering { picture, stats, names }
     }
 }

@@ -70,7 +70,7 @@ impl Tiles {
         Some(TileWork { block, pixels: block.part(&whole, &pixels), effort, counts })
     }
 
-    pub fn stats(&self, threads: usize, trace_seconds: f64) -> Stats {
-        Stats { threads, plan_seconds: self.plan_seconds, trace_seconds, ..Stats::default() }
+    pub fn stats(&self) -> Stats {
+        Stats { plan_seconds: self.plan_seconds, ..Stats::default() }
     }
 }

@@ -13,6 +13,7 @@ mod sums;
 mod tape;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::mem::take;
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -21,8 +22,9 @@ pub(super) use self::near::Near;
 pub(super) use self::sums::{LayerWork, Place, Sums};
 pub(super) use self::tape::LayerTape;
 
+use super::adaptive::Effort;
 use super::{Renderer, shutter};
-use crate::film::{Channel, Cryptomatte, Picture, Samples, Window};
+use crate::film::{Channel, Cryptomatte, Picture, Samples};
 use crate::scene::{Aov, Camera, Layers, Objects, Scene, carried};
 
 /// The depth of a miss: finite, so that filters do not spread infinity.
@@ -30,6 +32,9 @@ pub(super) const MISS_DEPTH: f32 = 1e10;
 
 /// The margin of a miss, and the most that one is: finite as well.
 pub(super) const MOST_MARGIN: f64 = 1e10;
+
+/// Keys that each Cryptomatte shows.
+pub(super) type Seen = [BTreeSet<u32>; Aov::CRYPTOMATTES.len()];
 
 /// What the layers of one frame need to know of its scene.
 #[derive(Debug)]
@@ -120,11 +125,15 @@ impl<'s> LayerPlan<'s> {
 
     /// Channels in the order of their samples in a block.
     fn channels(&self) -> Vec<(String, Kind)> {
+        self.layers.iter().flat_map(|aov| self.channels_of(aov)).collect()
+    }
+
+    fn channels_of(&self, aov: Aov) -> Vec<(String, Kind)> {
         let some = |layer: &str, suffixes: &str, kind| -> Vec<(String, Kind)> {
             suffixes.chars().map(|suffix| (format!("{layer}.{suffix}"), kind)).collect()
         };
         let named = |names: &[&str], kind| names.iter().map(|name| ((*name).to_owned(), kind)).collect();
-        let of = |aov: Aov| match aov {
+        match aov {
             Aov::Depth => some("depth", "Z", Kind::Float),
             Aov::Position => some("P", "XYZ", Kind::Float),
             Aov::Normal => some("N", "XYZ", Kind::Half),
@@ -140,44 +149,58 @@ impl<'s> LayerPlan<'s> {
                 let layers = 0..self.layers.ranks / 2;
                 layers.flat_map(|layer| some(&format!("{}{layer:02}", aov.name()), "RGBA", Kind::Float)).collect()
             }
-        };
-        self.layers.iter().flat_map(of).collect()
+        }
     }
 
-    /// Puts the layers of all blocks into a picture.
-    pub fn add_to<'a>(&self, works: impl Iterator<Item = (Window, &'a LayerWork)>, picture: &mut Picture) {
-        let works: Vec<_> = works.collect();
-        let window = picture.window;
-        let channel = |(index, (name, kind)): (usize, (String, Kind))| {
-            let floats = || fill(window, &works, |work| work.channels[index].floats());
+    /// Puts the channels into a picture, all 0.
+    pub fn open(&self, picture: &mut Picture) {
+        let area = picture.window.area();
+        let blank = |(name, kind): (String, Kind)| {
             let samples = match kind {
-                Kind::Half => Samples::Half(floats()),
-                Kind::Float => Samples::Float(floats()),
-                Kind::Uint => Samples::Uint(fill(window, &works, |work| match &work.channels[index] {
-                    Samples::Uint(ids) => Some(ids.as_slice()),
-                    Samples::Half(_) | Samples::Float(_) => None,
-                })),
+                Kind::Half => Samples::Half(vec![0.0; area]),
+                Kind::Float => Samples::Float(vec![0.0; area]),
+                Kind::Uint => Samples::Uint(vec![0; area]),
             };
             Channel { name, samples }
         };
-        let channels: Vec<_> = self.channels().into_iter().enumerate().collect();
-        picture.channels = channels.into_par_iter().map(channel).collect();
-        picture.cryptomattes = self.cryptomattes(&works);
+        picture.channels = self.channels().into_iter().map(blank).collect();
+    }
+
+    /// Puts what a noise level took in the place of what is known of its first samples alone.
+    pub fn tell_effort(&self, effort: &Effort, work: &mut LayerWork) {
+        let mut channels = &mut work.channels[..];
+        for aov in self.layers.iter() {
+            let (own, rest) = take(&mut channels).split_at_mut(self.channels_of(aov).len());
+            for (part, samples) in own.iter_mut().enumerate() {
+                match aov {
+                    Aov::Samples => *samples = Samples::Float(vec![effort.samples as f32; samples.len()]),
+                    Aov::Variance => {
+                        *samples = Samples::Float(effort.variance.iter().map(|variance| variance[part]).collect());
+                    }
+                    _ => {}
+                }
+            }
+            channels = rest;
+        }
+    }
+
+    /// What is seen in a picture, by the keys that its blocks told of, beside what it knows already.
+    pub fn add_cryptomattes(&self, seen: &Seen, picture: &mut Picture) {
+        let before = take(&mut picture.cryptomattes);
+        let asked =
+            Aov::CRYPTOMATTES.into_iter().zip(&self.ids).zip(seen).filter(|((aov, _), _)| self.layers.has(*aov));
+        for ((aov, ids), seen) in asked {
+            let entry = |key: &u32| (self.name(aov, *key), ids[*key as usize]);
+            let earlier =
+                before.iter().filter(|matte| matte.name == aov.name()).flat_map(|matte| matte.manifest.clone());
+            let manifest = earlier.chain(seen.iter().map(entry)).collect();
+            picture.cryptomattes.push(Cryptomatte { name: aov.name().to_owned(), manifest });
+        }
         if self.layers.has(Aov::Cost) {
             // Blocks were rendered whole, and may have seen what lies beyond the picture.
             let present = picture.cryptomattes.iter().map(|matte| matte.present(&picture.channels));
             picture.cryptomattes = present.collect();
         }
-    }
-
-    fn cryptomattes(&self, works: &[(Window, &LayerWork)]) -> Vec<Cryptomatte> {
-        let asked = Aov::CRYPTOMATTES.into_iter().enumerate().filter(|(_, aov)| self.layers.has(*aov));
-        let matte = |(index, aov): (usize, Aov)| {
-            let seen: BTreeSet<u32> = works.iter().flat_map(|(_, work)| &work.seen[index]).copied().collect();
-            let entry = |key: u32| (self.name(aov, key), self.ids[index][key as usize]);
-            Cryptomatte { name: aov.name().to_owned(), manifest: seen.into_iter().map(entry).collect() }
-        };
-        asked.map(matte).collect()
     }
 
     /// Names of the numbers in the id channels of a picture, 0 left out.
@@ -205,21 +228,4 @@ pub struct IdNames {
     pub object: BTreeMap<u32, String>,
     /// Materials, by number.
     pub material: BTreeMap<u32, String>,
-}
-
-/// One channel of a window from those of its blocks.
-fn fill<'a, T: Copy + Default + 'a>(
-    window: Window,
-    works: &[(Window, &'a LayerWork)],
-    samples: impl Fn(&'a LayerWork) -> Option<&'a [T]>,
-) -> Vec<T> {
-    let mut all = vec![T::default(); window.area()];
-    for (block, work) in works {
-        for (row, y) in samples(work).into_iter().flat_map(|part| part.chunks(block.width())).zip(block.y0..) {
-            if let Some(start) = window.index(block.x0, y) {
-                all[start..start + row.len()].copy_from_slice(row);
-            }
-        }
-    }
-    all
 }
