@@ -376,6 +376,25 @@ fn layers_hold_nothing_that_spreads() {
     assert!(scenes > 6, "{scenes}");
 }
 
+/// To a noise level layers are means of the samples that they are made of, however many those are.
+#[test]
+fn layers_to_a_noise_level_are_those_of_samples_enough() {
+    let scene = scene();
+    let layers = everything();
+    let plain = render(&scene, layers, |renderer| renderer.spp(64)).picture;
+    let noise = render(&scene, layers, |renderer| renderer.spp(16).noise(Some(0.02))).picture;
+    let mut compared = 0;
+    for (a, b) in plain.channels.iter().zip(&noise.channels).filter(|(a, _)| ["N", "albedo"].contains(&a.layer())) {
+        let (Some(a), Some(b)) = (a.samples.floats(), b.samples.floats()) else { continue };
+        let far = a.iter().zip(b).filter(|(a, b)| (*a - *b).abs() > 0.2).count();
+        assert!(far * 10 < a.len(), "{far} of {}", a.len());
+        compared += 1;
+    }
+    assert_eq!(compared, 6);
+    let sum = |picture: &Picture| floats(picture, "crypto_object00.G").iter().sum::<f32>();
+    assert!((sum(&noise) / sum(&plain) - 1.0).abs() < 0.02, "{} {}", sum(&noise), sum(&plain));
+}
+
 /// Margins are large in the middle of what is seen and fall toward its rims, below 8 where f64 had to decide: from far
 /// away more of them. Both engines tell the same.
 #[test]

@@ -101,12 +101,18 @@ pub trait Record {
     fn passes_blanks(&self) -> bool {
         !Self::ON && !Self::SURFACES
     }
-    /// Camera rays of one packet met surfaces.
-    fn surface(&mut self, _: &Seen) {}
-    /// The camera rays of a tile met all that they meet.
+    /// Whether what each tile costs is to be told.
+    fn counts_tiles(&self) -> bool {
+        false
+    }
+    /// The camera rays of a tile are about to be traced.
     fn taken(&mut self, _: &Taken) {}
+    /// Camera rays of one packet of that tile met surfaces.
+    fn surface(&mut self, _: &Seen) {}
     /// All that goes on from some tiles is known.
     fn summed(&mut self, _: &Summed) {}
+    /// What some samples took; a sample may be told of more than once.
+    fn spent(&mut self, _: &Spent) {}
 }
 
 /// What the camera rays of a packet met. Lanes that are not in `hit` mean nothing.
@@ -141,10 +147,6 @@ pub struct Taken<'a> {
     pub pixels: &'a [[u32; LANES]],
     /// Squares of their distances from the centres of their pixels, pixels.
     pub distances: &'a [[f64; LANES]; PACKETS],
-    /// Tests done for them, but for what goes on from them.
-    pub tests: Counts,
-    /// Rays traced for them, and packets.
-    pub rays: RayCounts,
 }
 
 /// Samples of some tiles and what came of them.
@@ -156,9 +158,18 @@ pub struct Summed<'a> {
     pub pixels: &'a [[u32; LANES]],
     /// Radiance and alpha.
     pub samples: &'a Samples,
-    /// Tests done for what goes on from them.
+}
+
+/// Work for some samples.
+#[derive(Debug, Clone, Copy)]
+pub struct Spent<'a> {
+    /// How many there are; they fill packet after packet.
+    pub count: usize,
+    /// The pixel of each in the block's row-by-row list, by packet.
+    pub pixels: &'a [[u32; LANES]],
+    /// Tests done for them.
     pub tests: Counts,
-    /// Rays traced of that, and packets.
+    /// Rays traced for them, and packets.
     pub rays: RayCounts,
 }
 

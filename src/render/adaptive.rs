@@ -15,7 +15,7 @@ pub struct Noise {
     /// Relative error of a tile: the root of the mean square of its pixels' standard errors over their mean.
     pub target: f64,
     /// Samples of each half to begin with.
-    fewest: u32,
+    pub fewest: u32,
 }
 
 /// What was spent on a tile, and what came of it.

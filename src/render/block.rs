@@ -10,8 +10,8 @@ use super::layers::LayerWork;
 use crate::accel::{Counts, PACKETS};
 use crate::film::Window;
 use crate::integrate::{
-    CameraRays, Direct, PixelPattern, RayCounts, RayKind, Record, Room, Samples, Samples8, Silent, Summed, Taken, WAVE,
-    Wave,
+    CameraRays, Direct, PixelPattern, RayCounts, RayKind, Record, Room, Samples, Samples8, Silent, Spent, Summed,
+    Taken, WAVE, Wave,
 };
 use crate::lanes::{LANES, Vec3x8};
 use crate::plan::{LeftOut, Skip};
@@ -255,18 +255,14 @@ impl<R: Record> Work<'_, '_, R> {
         if self.direct.draws() {
             self.room.seeds.extend(batch.samples);
         }
+        if R::SURFACES {
+            let Batch { samples, count, pixels, traced, distances, .. } = &*batch;
+            let pixels = &pixels[traced / LANES..];
+            self.record.taken(&Taken { count: *count, samples, pixels, distances });
+        }
         self.direct.trace_camera(batch.sees, &mut self.room, self.record);
         if R::SURFACES {
-            let (tests, rays) = self.news();
-            let Batch { samples, count, pixels, traced, distances, .. } = &*batch;
-            self.record.taken(&Taken {
-                count: *count,
-                samples,
-                pixels: &pixels[traced / LANES..],
-                distances,
-                tests,
-                rays,
-            });
+            self.tell_cost(batch.count, &batch.pixels[batch.traced / LANES..]);
         }
         self.tiles += 1;
         self.background_tiles += u64::from(self.room.rays.hits[RayKind::Camera as usize] == met);
@@ -277,11 +273,14 @@ impl<R: Record> Work<'_, '_, R> {
         }
     }
 
-    /// Tests and rays since the last time that this was asked.
-    fn news(&mut self) -> (Counts, RayCounts) {
-        let now = (self.room.walk.counts, self.room.rays);
-        let before = std::mem::replace(&mut self.before, now);
-        (now.0.since(&before.0), now.1.since(&before.1))
+    /// Tells of the tests and rays since the last time.
+    fn tell_cost(&mut self, count: usize, pixels: &[[u32; LANES]]) {
+        if count > 0 && self.record.counts_tiles() {
+            let now = (self.room.walk.counts, self.room.rays);
+            let before = std::mem::replace(&mut self.before, now);
+            let (tests, rays) = (now.0.since(&before.0), now.1.since(&before.1));
+            self.record.spent(&Spent { count, pixels, tests, rays });
+        }
     }
 
     /// Traces what goes on and adds the samples to their pixels.
@@ -291,9 +290,9 @@ impl<R: Record> Work<'_, '_, R> {
         }
         batch.add_to(&self.room.samples, &mut self.sums);
         if R::SURFACES {
-            let (tests, rays) = self.news();
             let (count, pixels, samples) = (batch.traced, &batch.pixels[..], &self.room.samples);
-            self.record.summed(&Summed { count, pixels, samples, tests, rays });
+            self.record.summed(&Summed { count, pixels, samples });
+            self.tell_cost(count, pixels);
         }
         self.room.begin();
         (batch.traced, batch.count) = (0, 0);

@@ -123,9 +123,10 @@ impl<'s> Gathering<'_, 's> {
         let (window, pixels) = self.task.pixels(&traced);
         let layers = self.task.asked().and_then(|_| self.task.layers(&traced));
         let number = |y: i32| y.div_euclid(EDGE);
-        let band = usize::try_from(number(window.y0) - number(self.task.window.y0)).ok();
-        if let Some(band) = band.and_then(|band| self.bands.get(band)) {
-            lock(band).put(window, pixels, layers.map_or(&[], |work| &work.channels));
+        let first = number(self.task.window.y0);
+        for number in number(window.y0)..=number(window.y1 - 1) {
+            let band = usize::try_from(number - first).ok().and_then(|band| self.bands.get(band));
+            band.into_iter().for_each(|band| lock(band).put(window, pixels, layers.map_or(&[], |work| &work.channels)));
         }
         let mut tally = lock(self.tally);
         if let Some(work) = layers {

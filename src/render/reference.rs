@@ -51,7 +51,7 @@ impl Rows {
     pub fn trace(&self, row: usize, layers: Option<&LayerPlan>, stop: &(dyn Fn() -> bool + Sync)) -> Option<RowWork> {
         let (mut counts, y) = (RayCounts::default(), self.window.y0 + row as i32);
         let (width, spp) = (self.window.width(), self.spp);
-        let mut sums = layers.map(|plan| (plan, Sums::new(plan, width, spp)));
+        let mut sums = layers.map(|plan| (plan, Sums::new(plan, width, Some(spp))));
         let mut places = Vec::new();
         let mut pixel = |(index, x)| {
             if stop() {
@@ -108,13 +108,11 @@ fn add_layers(plan: &LayerPlan, sums: &mut Sums, index: usize, pixel: &Pixel) {
         if sums.want_mattes() {
             sums.add_to_mattes(plan, index, primitive, material);
         }
-        if nearest(pixel) == Some(sample)
-            && let Some(near) = sums.near.get_mut(index)
-        {
+        if nearest(pixel) == Some(sample) {
             // A row of no store: any that is no miss will do.
             let row = RowRef::new(Kind::Sphere, 0);
-            let (t, depth) = (0.0, first.depth as f32);
-            *near = Near { distance: seen.distance, t, depth, row, primitive, material, sample: sample as u32 };
+            let near = Near { t: 0.0, row, primitive, material, sample: sample as u32 };
+            sums.nearest().see(index, near, first.depth as f32, |primitive| plan.objects.of(primitive));
         }
     }
 }

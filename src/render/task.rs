@@ -216,6 +216,7 @@ impl<'s> Task<'s> {
             Some(plan) => {
                 let mut tape = LayerTape::new(frames, plan, whole.window.area());
                 let work = block.trace_until(noise, views, &direct, &mut tape, stop)?;
+                tape.took(&vec![noise.fewest; whole.window.area()]);
                 let mut layers = tape.finish(whole.window);
                 work.effort.iter().for_each(|effort| plan.tell_effort(effort, &mut layers));
                 BlockWork { layers: Some(layers), ..work }

@@ -1,16 +1,14 @@
 //! What a pixel keeps: the sample nearest to its centre, and batches of samples for the variance of its mean.
 
+use crate::lanes::LANES;
+use crate::scene::{Aov, Layers};
 use crate::shapes::RowRef;
 
 /// What the sample nearest to a pixel's centre saw.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::render) struct Near {
-    /// Square of its distance from the centre; infinite before the first sample.
-    pub distance: f64,
     /// Place of the hit on its ray.
     pub t: f32,
-    /// Along the view axis.
-    pub depth: f32,
     /// What was met.
     pub row: RowRef,
     pub primitive: u32,
@@ -20,16 +18,112 @@ pub(in crate::render) struct Near {
 }
 
 impl Near {
-    /// No sample yet.
-    pub const NONE: Near = Near {
-        distance: f64::INFINITY,
-        t: 0.0,
-        depth: super::MISS_DEPTH,
-        row: RowRef::MISS,
-        primitive: 0,
-        material: 0,
-        sample: 0,
-    };
+    /// Nothing, or no sample yet.
+    pub const NONE: Near = Near { t: 0.0, row: RowRef::MISS, primitive: 0, material: 0, sample: 0 };
+}
+
+/// What the samples nearest to the centres of a block's pixels saw, as far as layers need it: the rest is empty.
+#[derive(Debug)]
+pub(in crate::render) struct Nearest {
+    /// Squares of their distances from the centres; infinite before the first sample.
+    distances: Vec<f64>,
+    /// Along the view axis.
+    pub depth: Vec<f32>,
+    /// Numbers of what is seen, 0 for nothing.
+    pub objects: Vec<u32>,
+    pub materials: Vec<u32>,
+    /// For what follows from the hit itself.
+    pub near: Vec<Near>,
+    /// Whether any of it is needed.
+    is_asked: bool,
+}
+
+impl Nearest {
+    pub fn new(layers: Layers, pixels: usize, spp: Option<u32>) -> Self {
+        let near = [Aov::Position, Aov::Uv, Aov::Motion, Aov::Margin];
+        let asks = |aovs: &[Aov]| if layers.has_any(aovs) { pixels } else { 0 };
+        let is_asked = layers.has_any(&[&near[..], &[Aov::Depth, Aov::Ids]].concat());
+        let choices = if is_asked && spp != Some(1) { pixels } else { 0 };
+        Nearest {
+            distances: vec![f64::INFINITY; choices],
+            depth: vec![super::MISS_DEPTH; asks(&[Aov::Depth])],
+            objects: vec![0; asks(&[Aov::Ids])],
+            materials: vec![0; asks(&[Aov::Ids])],
+            near: vec![Near::NONE; asks(&near)],
+            is_asked,
+        }
+    }
+
+    /// Of some samples of a packet, counted from lane 0, those that are the nearest of their pixels so far, the first of
+    /// equals. Until more is said of them they see nothing.
+    pub fn choose(&mut self, (pixels, index): Lanes, distances: &[f64; LANES], count: usize) -> u32 {
+        if self.distances.is_empty() {
+            return if self.is_asked { (1 << count) - 1 } else { 0 };
+        }
+        if count == LANES && *pixels == [pixels[0]; LANES] {
+            let (best, distance) = least8(distances);
+            return self.choose_if(pixels[0] as usize, (best, distance), index);
+        }
+        let (mut chosen, mut i) = (0, 0);
+        while i < count {
+            let end = i + pixels[i..count].iter().take_while(|pixel| **pixel == pixels[i]).count();
+            let least = |a: (usize, f64), b: (usize, f64)| if b.1 < a.1 { b } else { a };
+            let best = (i..end).map(|i| (i, distances[i])).fold((i, f64::INFINITY), least);
+            chosen |= self.choose_if(pixels[i] as usize, best, index);
+            i = end;
+        }
+        chosen
+    }
+
+    /// The lane of a sample, where it is the nearest one so far.
+    fn choose_if(&mut self, pixel: usize, (lane, distance): (usize, f64), index: &[u32; LANES]) -> u32 {
+        let so_far = &mut self.distances[pixel];
+        if distance < *so_far {
+            *so_far = distance;
+            self.clear(pixel, index[lane]);
+            return 1 << lane;
+        }
+        0
+    }
+
+    fn clear(&mut self, pixel: usize, sample: u32) {
+        set(&mut self.depth, pixel, super::MISS_DEPTH);
+        set(&mut self.objects, pixel, 0);
+        set(&mut self.materials, pixel, 0);
+        set(&mut self.near, pixel, Near { sample, ..Near::NONE });
+    }
+
+    /// What a sample sees that was chosen; `object` gives the number of the object that a primitive belongs to.
+    #[inline]
+    pub fn see(&mut self, pixel: usize, near: Near, depth: f32, object: impl FnOnce(u32) -> u32) {
+        set(&mut self.depth, pixel, depth);
+        if let Some(number) = self.objects.get_mut(pixel) {
+            *number = object(near.primitive) + 1;
+        }
+        set(&mut self.materials, pixel, near.material + 1);
+        set(&mut self.near, pixel, near);
+    }
+}
+
+/// Pixels and indices of a packet's samples.
+type Lanes<'a> = (&'a [u32; LANES], &'a [u32; LANES]);
+
+/// The first lane of the least distance, and that: without branches, which nobody could foretell.
+#[inline]
+fn least8(distances: &[f64; LANES]) -> (usize, f64) {
+    let least = |a: f64, b: f64| if b < a { b } else { a };
+    let four: [f64; 4] = std::array::from_fn(|i| least(distances[i], distances[i + 4]));
+    let distance = least(least(four[0], four[2]), least(four[1], four[3]));
+    let lanes = (0..LANES).fold(0u32, |lanes, i| lanes | u32::from(distances[i] == distance) << i);
+    (lanes.trailing_zeros() as usize % LANES, distance)
+}
+
+/// Sets an element, if there is one.
+#[inline]
+fn set<T>(all: &mut [T], index: usize, value: T) {
+    if let Some(place) = all.get_mut(index) {
+        *place = value;
+    }
 }
 
 /// Samples of a pixel in batches, for the variance of their mean.

@@ -1,9 +1,11 @@
 //! The layers of a block in the making, and as channels.
 
+use std::mem::{replace, take};
+
 use glam::{DVec2, DVec3};
 
 use super::matte::{Rank, Tally, ranked};
-use super::near::{Batches, Near};
+use super::near::{Batches, Near, Nearest};
 use super::{LayerPlan, MOST_MARGIN};
 use crate::film::Samples;
 use crate::lanes::{Float8, LANES, Vec3x8};
@@ -16,57 +18,124 @@ pub(in crate::render) struct Sums {
     pixels: usize,
     /// Samples of each pixel.
     spp: u32,
-    /// Sums of what passes the pixel filter, by axis: samples are drawn from it, so all weigh the same.
+    /// The same where pixels differ.
+    took: Vec<u32>,
     pub normal: Filtered,
     pub albedo: Filtered,
     /// Sums of shares: box tests, primitive tests, live lanes, lanes.
     pub cost: Vec<[f64; 4]>,
-    pub near: Vec<Near>,
+    nearest: Nearest,
     batches: Vec<Batches>,
     batch: u32,
     tallies: [Option<Tally>; Aov::CRYPTOMATTES.len()],
 }
 
-/// Sums of three values of each pixel, by value; empty where no layer needs them.
+/// Three values of each pixel that pass the pixel filter: samples are drawn from it, so all weigh the same.
 #[derive(Debug)]
-pub(in crate::render) struct Filtered([Vec<f64>; 3]);
+pub(in crate::render) enum Filtered {
+    /// No layer needs them.
+    Unasked,
+    /// Of a single sample: the values, by axis.
+    Single([Vec<f32>; 3]),
+    /// Of several: their sums, by axis.
+    Sums([Vec<f64>; 3]),
+}
+
+/// Samples of a packet.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::render) struct Places<'a> {
+    /// Their pixels.
+    pub pixels: &'a [u32; LANES],
+    /// Those that count.
+    pub lanes: u32,
+    /// Whether all lanes are of one pixel, whose samples are so many packets in any block.
+    pub whole: bool,
+}
 
 impl Filtered {
-    fn new(pixels: usize) -> Self {
-        Filtered([(); 3].map(|()| vec![0.0; pixels]))
+    fn new(asked: bool, pixels: usize, spp: Option<u32>) -> Self {
+        match (asked, spp) {
+            (false, _) => Filtered::Unasked,
+            (true, Some(1)) => Filtered::Single([(); 3].map(|()| vec![0.0; pixels])),
+            (true, _) => Filtered::Sums([(); 3].map(|()| vec![0.0; pixels])),
+        }
     }
 
-    pub fn is_empty(&self) -> bool {
-        self.0[0].is_empty()
+    pub fn is_asked(&self) -> bool {
+        !matches!(self, Filtered::Unasked)
     }
 
-    /// Adds the values of eight samples to their pixels, in the order of the lanes; misses have 0.
+    /// Adds the values of a packet to their pixels; lanes that do not count have 0.
     #[inline]
-    pub fn add8(&mut self, values: &Vec3x8, pixels: &[u32; LANES]) {
+    pub fn add8(&mut self, values: &Vec3x8, places: &Places) {
         let axes = [values.x, values.y, values.z].map(Float8::to_array);
-        let one = pixels.iter().all(|pixel| *pixel == pixels[0]);
-        for (sums, values) in self.0.iter_mut().zip(axes) {
-            if one {
-                let sum = &mut sums[pixels[0] as usize];
-                *sum = values.iter().fold(*sum, |sum, value| sum + f64::from(*value));
-            } else {
-                for (pixel, value) in pixels.iter().zip(values) {
-                    sums[*pixel as usize] += f64::from(value);
-                }
+        match self {
+            Filtered::Unasked => {}
+            Filtered::Single(columns) => {
+                columns.iter_mut().zip(&axes).for_each(|(column, axis)| places.set(column, axis))
             }
+            Filtered::Sums(sums) => sums.iter_mut().zip(&axes).for_each(|(sums, axis)| places.add(sums, axis)),
         }
     }
 
     /// Adds one sample to a pixel.
     pub fn add(&mut self, pixel: usize, value: DVec3) {
-        if !self.is_empty() {
-            self.0.iter_mut().zip(value.to_array()).for_each(|(sums, value)| sums[pixel] += value);
+        match self {
+            Filtered::Unasked => {}
+            Filtered::Single(columns) => {
+                columns.iter_mut().zip(value.to_array()).for_each(|(column, value)| column[pixel] = value as f32);
+            }
+            Filtered::Sums(sums) => {
+                sums.iter_mut().zip(value.to_array()).for_each(|(sums, value)| sums[pixel] += value)
+            }
         }
     }
 
-    fn means(&self, spp: u32) -> impl Iterator<Item = Samples> {
-        let share = 1.0 / f64::from(spp);
-        self.0.iter().map(move |sums| Samples::Half(sums.iter().map(|sum| (sum * share) as f32).collect()))
+    /// Means of so many samples each.
+    fn means(self, spp: u32, took: &[u32]) -> [Samples; 3] {
+        match self {
+            Filtered::Unasked => [(); 3].map(|()| Samples::Half(Vec::new())),
+            Filtered::Single(columns) => columns.map(Samples::Half),
+            Filtered::Sums(sums) if took.is_empty() => {
+                let share = 1.0 / f64::from(spp);
+                sums.map(|sums| Samples::Half(sums.iter().map(|sum| (sum * share) as f32).collect()))
+            }
+            Filtered::Sums(sums) => {
+                let mean = |(sum, spp): (&f64, &u32)| (sum * (1.0 / f64::from(*spp))) as f32;
+                sums.map(|sums| Samples::Half(sums.iter().zip(took).map(mean).collect()))
+            }
+        }
+    }
+}
+
+impl Places<'_> {
+    /// The lanes that count.
+    fn lanes(&self) -> impl Iterator<Item = usize> + use<> {
+        let lanes = self.lanes;
+        (0..LANES).filter(move |i| lanes >> i & 1 == 1)
+    }
+
+    #[inline]
+    fn set<T: Copy>(&self, column: &mut [T], values: &[T; LANES]) {
+        if self.lanes == (1 << LANES) - 1 {
+            self.pixels.iter().zip(values).for_each(|(pixel, value)| column[*pixel as usize] = *value);
+        } else {
+            self.lanes().for_each(|i| column[self.pixels[i] as usize] = values[i]);
+        }
+    }
+
+    /// In the order of the lanes, so that it does not matter how samples are spread over packets; in pairs where they
+    /// are always the same.
+    #[inline]
+    fn add(&self, sums: &mut [f64], values: &[f32; LANES]) {
+        if self.whole {
+            let four: [f64; 4] = std::array::from_fn(|i| f64::from(values[i]) + f64::from(values[i + 4]));
+            sums[self.pixels[0] as usize] += (four[0] + four[2]) + (four[1] + four[3]);
+            return;
+        }
+        for (pixel, value) in self.pixels.iter().zip(values) {
+            sums[*pixel as usize] += f64::from(*value);
+        }
     }
 }
 
@@ -80,20 +149,32 @@ pub(in crate::render) struct LayerWork {
 }
 
 impl Sums {
-    pub fn new(plan: &LayerPlan, pixels: usize, spp: u32) -> Self {
+    /// For a block of so many pixels; `spp` is `None` where it is not known before how many samples each of them has.
+    pub fn new(plan: &LayerPlan, pixels: usize, spp: Option<u32>) -> Self {
         let layers = plan.layers;
         let room = |aovs: &[Aov]| if layers.has_any(aovs) { pixels } else { 0 };
+        let samples = spp.unwrap_or(plan.spp);
         Sums {
             pixels,
-            spp,
-            normal: Filtered::new(room(&[Aov::Normal])),
-            albedo: Filtered::new(room(&[Aov::Albedo])),
+            spp: samples,
+            took: Vec::new(),
+            normal: Filtered::new(layers.has(Aov::Normal), pixels, spp),
+            albedo: Filtered::new(layers.has(Aov::Albedo), pixels, spp),
             cost: vec![[0.0; 4]; room(&[Aov::Cost])],
-            near: vec![Near::NONE; room(&[Aov::Depth, Aov::Position, Aov::Uv, Aov::Motion, Aov::Ids, Aov::Margin])],
+            nearest: Nearest::new(layers, pixels, spp),
             batches: vec![Batches::default(); room(&[Aov::Variance])],
-            batch: Batches::size(spp),
+            batch: Batches::size(samples),
             tallies: Aov::CRYPTOMATTES.map(|aov| layers.has(aov).then(|| Tally::new(pixels))),
         }
+    }
+
+    /// How many samples each pixel had, where that was not known before.
+    pub fn took(&mut self, samples: &[u32]) {
+        self.took = samples.to_vec();
+    }
+
+    fn samples(&self, pixel: usize) -> u32 {
+        self.took.get(pixel).copied().unwrap_or(self.spp)
     }
 
     /// Whether the variance is asked for.
@@ -105,6 +186,11 @@ impl Sums {
     #[inline]
     pub fn add_radiance(&mut self, pixel: usize, radiance: [f32; 3]) {
         self.batches[pixel].add(radiance, self.batch);
+    }
+
+    /// What is seen by the samples nearest to the centres.
+    pub fn nearest(&mut self) -> &mut Nearest {
+        &mut self.nearest
     }
 
     /// Whether any Cryptomatte is asked for.
@@ -122,30 +208,31 @@ impl Sums {
     }
 
     /// All channels. `place` tells where the nearest sample of a pixel sees something.
-    pub fn finish(self, plan: &LayerPlan, place: impl Fn(usize, &Near) -> Place) -> LayerWork {
+    pub fn finish(mut self, plan: &LayerPlan, place: impl Fn(usize, &Near) -> Place) -> LayerWork {
         let mut work = LayerWork { channels: Vec::new(), seen: Default::default() };
-        let wants_place = plan.layers.has_any(&[Aov::Position, Aov::Uv, Aov::Motion, Aov::Margin]);
-        let places: Vec<_> = match wants_place {
-            true => self.near.iter().enumerate().map(|(pixel, near)| placed(near, || place(pixel, near))).collect(),
-            false => Vec::new(),
-        };
+        let near = take(&mut self.nearest.near);
+        let places = near.iter().enumerate().map(|(pixel, near)| placed(near, || place(pixel, near)));
+        let places: Vec<_> = places.collect();
         for aov in plan.layers.iter() {
             match aov {
-                Aov::Depth => work.floats(self.near.iter().map(|near| near.depth)),
+                Aov::Depth => work.channels.push(Samples::Float(take(&mut self.nearest.depth))),
                 Aov::Position => (0..3).for_each(|k| work.floats(places.iter().map(|place| place.point[k] as f32))),
-                Aov::Normal => self.normal.means(self.spp).for_each(|mean| work.channels.push(mean)),
-                Aov::Albedo => self.albedo.means(self.spp).for_each(|mean| work.channels.push(mean)),
+                Aov::Normal => work.add_means(&mut self.normal, self.spp, &self.took),
+                Aov::Albedo => work.add_means(&mut self.albedo, self.spp, &self.took),
                 Aov::Uv => (0..2).for_each(|k| work.floats(places.iter().map(|place| place.uv[k] as f32))),
                 Aov::Motion => {
-                    let moves = self.near.iter().zip(&places).map(|(near, place)| match near.row {
+                    let moves = near.iter().zip(&places).map(|(near, place)| match near.row {
                         RowRef::MISS => [0.0; 2],
                         _ => plan.motion(near, place.point),
                     });
                     let moves: Vec<_> = moves.collect();
                     (0..2).for_each(|k| work.floats(moves.iter().map(|way| way[k])));
                 }
-                Aov::Ids => self.add_ids(plan, &mut work),
-                Aov::Samples => work.floats(std::iter::repeat_n(self.spp as f32, self.pixels)),
+                Aov::Ids => {
+                    let ids = [take(&mut self.nearest.objects), take(&mut self.nearest.materials)];
+                    work.channels.extend(ids.map(Samples::Uint));
+                }
+                Aov::Samples => work.floats((0..self.pixels).map(|pixel| self.samples(pixel) as f32)),
                 Aov::Variance => {
                     let all: Vec<_> = self.batches.iter().map(|batches| batches.variance(self.batch)).collect();
                     (0..3).for_each(|k| work.floats(all.iter().map(|variance| variance[k])));
@@ -161,14 +248,6 @@ impl Sums {
         work
     }
 
-    fn add_ids(&self, plan: &LayerPlan, work: &mut LayerWork) {
-        let seen = |near: &Near| near.row != RowRef::MISS;
-        let number = |near: &Near, id: u32| if seen(near) { id + 1 } else { 0 };
-        let objects = self.near.iter().map(|near| number(near, plan.objects.of(near.primitive)));
-        work.channels.push(Samples::Uint(objects.collect()));
-        work.channels.push(Samples::Uint(self.near.iter().map(|near| number(near, near.material)).collect()));
-    }
-
     fn add_mattes(&self, plan: &LayerPlan, aov: Aov, work: &mut LayerWork) {
         let index = aov as usize - Aov::CryptoObject as usize;
         let (Some(tally), kept) = (&self.tallies[index], usize::from(plan.layers.ranks)) else { return };
@@ -178,7 +257,7 @@ impl Sums {
             ranked(tally.of(pixel), &plan.ids[index], &mut ranks);
             for (rank, pair) in ranks.iter().zip(columns.chunks_exact_mut(2)) {
                 pair[0][pixel] = f32::from_bits(rank.id);
-                pair[1][pixel] = (f64::from(rank.count) / f64::from(self.spp)) as f32;
+                pair[1][pixel] = (f64::from(rank.count) / f64::from(self.samples(pixel))) as f32;
             }
             work.seen[index].extend(ranks.iter().take(kept).map(|rank| rank.key));
         }
@@ -191,6 +270,10 @@ impl Sums {
 impl LayerWork {
     fn floats(&mut self, samples: impl Iterator<Item = f32>) {
         self.channels.push(Samples::Float(samples.collect()));
+    }
+
+    fn add_means(&mut self, values: &mut Filtered, spp: u32, took: &[u32]) {
+        self.channels.extend(replace(values, Filtered::Unasked).means(spp, took));
     }
 }
 

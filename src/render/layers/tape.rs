@@ -2,11 +2,11 @@
 
 use super::LayerPlan;
 use super::near::Near;
-use super::sums::{LayerWork, Place, Sums};
-use crate::accel::{Counts, PACKETS};
+use super::sums::{LayerWork, Place, Places, Sums};
+use crate::accel::PACKETS;
 use crate::film::Window;
-use crate::integrate::{RayCounts, RayKind, Record, Samples8, Seen, Silent, Summed, Taken};
-use crate::lanes::{Float8, LANES, Mask8, Ray, Vec3x8};
+use crate::integrate::{RayKind, Record, Samples8, Seen, Silent, Spent, Summed, Taken};
+use crate::lanes::{LANES, Mask8, Ray, Vec3x8};
 use crate::plan::Owner;
 use crate::reference;
 use crate::render::{Frame, shutter};
@@ -22,55 +22,47 @@ pub(in crate::render) struct LayerTape<'a, 's> {
     /// What depth is counted along; `None`: along each ray.
     axis: Option<[f32; 3]>,
     sums: Sums,
-    tile: Box<Met>,
+    /// Whether packets of one pixel hold the same samples in any block.
+    whole: bool,
+    tile: [Packet; PACKETS],
 }
 
-/// What the camera rays of a tile met.
-struct Met {
-    hit: [u32; PACKETS],
-    normal: [Vec3x8; PACKETS],
-    albedo: [Vec3x8; PACKETS],
-    t: [Float8; PACKETS],
-    depth: [Float8; PACKETS],
-    rows: [Float8; PACKETS],
-    owners: [[Owner; LANES]; PACKETS],
-    materials: [[u32; LANES]; PACKETS],
+/// The samples of a packet of the tile that is traced.
+#[derive(Debug, Clone, Copy, Default)]
+struct Packet {
+    pixels: [u32; LANES],
+    index: [u32; LANES],
+    /// Lanes that are the nearest to the centres of their pixels.
+    nearest: u32,
+    whole: bool,
 }
 
-impl Met {
-    /// What a lane saw.
-    #[inline(always)]
-    fn near(&self, p: usize, i: usize, distance: f64, sample: u32) -> Near {
-        if self.hit[p] >> i & 1 == 0 {
-            return Near { distance, sample, ..Near::NONE };
-        }
-        Near {
-            distance,
-            t: self.t[p].as_array()[i],
-            depth: self.depth[p].as_array()[i],
-            row: RowRef::from_lane(self.rows[p].as_array()[i]),
-            primitive: self.owners[p][i].primitive,
-            material: self.materials[p][i],
-            sample,
-        }
+impl Packet {
+    fn lanes_of(&self, pixel: u32) -> u32 {
+        (0..LANES).fold(0, |lanes, i| lanes | u32::from(self.pixels[i] == pixel) << i)
+    }
+}
+
+/// A sample of a later packet is nearer to the centre of a pixel than those of the packets before.
+fn forget(packets: &mut [Packet], pixel: u32) {
+    // The samples of a pixel follow each other.
+    for packet in packets.iter_mut().rev().take_while(|packet| packet.pixels[LANES - 1] == pixel) {
+        packet.nearest &= !packet.lanes_of(pixel);
     }
 }
 
 impl<'a, 's> LayerTape<'a, 's> {
     pub fn new(frames: &'a [Frame<'s>], plan: &'a LayerPlan<'s>, pixels: usize) -> Self {
-        let zero = [Vec3x8::ZERO; PACKETS];
-        let tile = Met {
-            hit: [0; PACKETS],
-            normal: zero,
-            albedo: zero,
-            t: [Float8::ZERO; PACKETS],
-            depth: [Float8::ZERO; PACKETS],
-            rows: [Float8::ZERO; PACKETS],
-            owners: [[Owner::default(); LANES]; PACKETS],
-            materials: [[0; LANES]; PACKETS],
-        };
         let axis = frames[0].axis.map(|axis| axis.as_vec3().to_array());
-        LayerTape { frames, plan, axis, sums: Sums::new(plan, pixels, frames[0].spp), tile: Box::new(tile) }
+        // To a noise level a pixel takes what it needs.
+        let spp = frames[0].noise.is_none().then_some(frames[0].spp);
+        let whole = frames.len() == 1 && spp.is_some_and(|spp| (spp as usize).is_multiple_of(LANES));
+        LayerTape { frames, plan, axis, sums: Sums::new(plan, pixels, spp), whole, tile: Default::default() }
+    }
+
+    /// How many samples each pixel had, where that was not known before.
+    pub fn took(&mut self, samples: &[u32]) {
+        self.sums.took(samples);
     }
 
     /// What comes next is seen at this moment.
@@ -85,26 +77,6 @@ impl<'a, 's> LayerTape<'a, 's> {
         sums.finish(plan, |pixel, near| place(frame(near), block.pixel(pixel), near))
     }
 
-    /// Of the samples of a packet the nearest to the centre of each pixel, the first of equals.
-    fn add_near(&mut self, p: usize, count: usize, taken: &Taken) {
-        let (pixels, distances) = (&taken.pixels[p], &taken.distances[p]);
-        let mut i = 0;
-        while i < count {
-            let pixel = pixels[i];
-            let near = &mut self.sums.near[pixel as usize];
-            let (mut best, mut distance) = (LANES, near.distance);
-            while i < count && pixels[i] == pixel {
-                if distances[i] < distance {
-                    (best, distance) = (i, distances[i]);
-                }
-                i += 1;
-            }
-            if best < LANES {
-                *near = self.tile.near(p, best, distance, taken.samples[p].index[best]);
-            }
-        }
-    }
-
     fn add_radiance(&mut self, summed: &Summed) {
         for (p, pixels) in summed.pixels.iter().enumerate() {
             let radiance = summed.samples.radiance[p].to_arrays();
@@ -114,27 +86,34 @@ impl<'a, 's> LayerTape<'a, 's> {
         }
     }
 
-    fn add_to_mattes(&mut self, p: usize, pixels: &[u32; LANES]) {
-        for i in (0..LANES).filter(|i| self.tile.hit[p] >> i & 1 == 1) {
-            let (owner, material) = (self.tile.owners[p][i], self.tile.materials[p][i]);
-            self.sums.add_to_mattes(self.plan, pixels[i] as usize, owner.primitive, material);
+    fn add_to_mattes(&mut self, packet: &Packet, seen: &Seen) {
+        for i in lanes(seen.hit) {
+            let (pixel, owner) = (packet.pixels[i] as usize, seen.owners[i]);
+            self.sums.add_to_mattes(self.plan, pixel, owner.primitive, seen.materials[i]);
         }
     }
 
-    /// Spreads what some samples cost over their pixels.
-    fn add_cost(&mut self, (count, pixels): (usize, &[[u32; LANES]]), tests: &Counts, rays: &RayCounts) {
-        if !self.plan.layers.has(Aov::Cost) || count == 0 {
-            return;
-        }
-        let share = 1.0 / count as f64;
-        let all = |counts: &[u64]| counts.iter().sum::<u64>() as f64 * share;
-        let (boxes, lanes) = (tests.boxes as f64 * share, all(&rays.packets) * LANES as f64);
-        let cost = [boxes, all(&tests.kinds), all(&rays.rays), lanes];
-        for pixel in pixels.iter().flatten().take(count) {
-            let sum = &mut self.sums.cost[*pixel as usize];
-            *sum = std::array::from_fn(|k| sum[k] + cost[k]);
+    fn add_nearest(&mut self, packet: &Packet, nearest: u32, seen: &Seen) {
+        let (t, dir) = (seen.rays.t_max, seen.rays.dir);
+        let share = self.axis.map_or_else(|| dir.length(), |axis| dir.dot(Vec3x8::splat(axis)));
+        let (depth, t, rows) = ((t * share).to_array(), t.to_array(), seen.rows.to_array());
+        let (plan, all) = (self.plan, self.sums.nearest());
+        for i in lanes(nearest) {
+            let near = Near {
+                t: t[i],
+                row: RowRef::from_lane(rows[i]),
+                primitive: seen.owners[i].primitive,
+                material: seen.materials[i],
+                sample: packet.index[i],
+            };
+            all.see(packet.pixels[i] as usize, near, depth[i], |primitive| plan.objects.of(primitive));
         }
     }
+}
+
+/// The lanes of a mask.
+fn lanes(mask: u32) -> impl Iterator<Item = usize> {
+    (0..LANES).filter(move |i| mask >> i & 1 == 1)
 }
 
 impl Record for LayerTape<'_, '_> {
@@ -153,47 +132,60 @@ impl Record for LayerTape<'_, '_> {
         !self.plan.layers.has_any(&[Aov::Cost, Aov::Variance])
     }
 
-    fn surface(&mut self, seen: &Seen) {
-        let (p, tile) = (seen.packet, &mut self.tile);
-        let dir = seen.rays.dir;
-        tile.hit[p] = seen.hit;
-        let hit = Mask8::from_bits(seen.hit);
-        tile.normal[p] = Vec3x8::select(hit, seen.normal, Vec3x8::ZERO);
-        tile.albedo[p] = Vec3x8::select(hit, seen.bsdf.reflectance(), Vec3x8::ZERO);
-        (tile.t[p], tile.rows[p]) = (seen.rays.t_max, seen.rows);
-        tile.depth[p] = seen.rays.t_max
-            * match self.axis {
-                Some(axis) => dir.dot(Vec3x8::splat(axis)),
-                None => dir.length(),
-            };
-        (tile.owners[p], tile.materials[p]) = (*seen.owners, *seen.materials);
+    fn counts_tiles(&self) -> bool {
+        self.plan.layers.has(Aov::Cost)
     }
 
     fn taken(&mut self, taken: &Taken) {
-        for p in 0..taken.count.div_ceil(LANES) {
-            let (count, pixels) = (LANES.min(taken.count - p * LANES), &taken.pixels[p]);
-            if self.tile.hit[p] != 0 && !self.sums.normal.is_empty() {
-                self.sums.normal.add8(&self.tile.normal[p], pixels);
-            }
-            if self.tile.hit[p] != 0 && !self.sums.albedo.is_empty() {
-                self.sums.albedo.add8(&self.tile.albedo[p], pixels);
-            }
-            if !self.sums.near.is_empty() {
-                self.add_near(p, count, taken);
-            }
-            if self.sums.want_mattes() {
-                self.add_to_mattes(p, pixels);
+        let packets = taken.samples.iter().zip(taken.pixels).zip(taken.distances);
+        for (p, ((samples, pixels), distances)) in packets.enumerate() {
+            let count = LANES.min(taken.count - p * LANES);
+            let nearest = self.sums.nearest().choose((pixels, &samples.index), distances, count);
+            let (before, rest) = self.tile.split_at_mut(p);
+            let whole = self.whole && *pixels == [pixels[0]; LANES];
+            rest[0] = Packet { pixels: *pixels, index: samples.index, nearest, whole };
+            let goes_on = before.last().is_some_and(|packet| packet.pixels[LANES - 1] == pixels[0]);
+            if goes_on && nearest & rest[0].lanes_of(pixels[0]) != 0 {
+                forget(before, pixels[0]);
             }
         }
-        self.add_cost((taken.count, taken.pixels), &taken.tests, &taken.rays);
-        self.tile.hit = [0; PACKETS];
+    }
+
+    fn surface(&mut self, seen: &Seen) {
+        let packet = self.tile[seen.packet];
+        let hit = Mask8::from_bits(seen.hit);
+        let places = Places { pixels: &packet.pixels, lanes: seen.hit, whole: packet.whole };
+        if self.sums.normal.is_asked() {
+            self.sums.normal.add8(&Vec3x8::select(hit, seen.normal, Vec3x8::ZERO), &places);
+        }
+        if self.sums.albedo.is_asked() {
+            self.sums.albedo.add8(&Vec3x8::select(hit, seen.bsdf.reflectance(), Vec3x8::ZERO), &places);
+        }
+        let nearest = packet.nearest & seen.hit;
+        if nearest != 0 {
+            self.add_nearest(&packet, nearest, seen);
+        }
+        if self.sums.want_mattes() {
+            self.add_to_mattes(&packet, seen);
+        }
     }
 
     fn summed(&mut self, summed: &Summed) {
         if self.sums.want_variance() {
             self.add_radiance(summed);
         }
-        self.add_cost((summed.count, summed.pixels), &summed.tests, &summed.rays);
+    }
+
+    /// Spreads what some samples cost over their pixels.
+    fn spent(&mut self, spent: &Spent) {
+        let (tests, rays, share) = (&spent.tests, &spent.rays, 1.0 / spent.count as f64);
+        let all = |counts: &[u64]| counts.iter().sum::<u64>() as f64 * share;
+        let (boxes, lanes) = (tests.boxes as f64 * share, all(&rays.packets) * LANES as f64);
+        let cost = [boxes, all(&tests.kinds), all(&rays.rays), lanes];
+        for pixel in spent.pixels.iter().flatten().take(spent.count) {
+            let sum = &mut self.sums.cost[*pixel as usize];
+            *sum = std::array::from_fn(|k| sum[k] + cost[k]);
+        }
     }
 }
 
