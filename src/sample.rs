@@ -38,11 +38,6 @@ pub fn pixel_key(seed: u64, x: i32, y: i32) -> u32 {
     (mix(mix(seed) ^ place) >> 32) as u32
 }
 
-/// The seed of patterns that have nothing to do with those of `seed`.
-pub fn other_seed(seed: u64) -> u64 {
-    mix(seed ^ 0x6a09_e667_f3bc_c908)
-}
-
 /// The sample pattern of one pixel in one pair of dimensions: keys of its order and of its coordinates.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Pattern {

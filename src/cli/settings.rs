@@ -33,8 +33,8 @@ pub struct Settings {
     /// Samples per pixel [default: as in the scene]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     spp: Option<u32>,
-    /// Sample each tile of 32 x 32 pixels until its estimated relative error is below T, such as 0.02; each pixel has at
-    /// least the scene's samples, at most 4096 [default: as in the scene]
+    /// Sample each tile of 64 x 64 pixels until its estimated relative error is below T, such as 0.02 (of the mean square;
+    /// values below 0.1 count as 0.1), with 8 to 4096 samples a pixel, most where they help most [default: as in the scene]
     #[arg(long, value_name = "T", value_parser = noise, conflicts_with = "spp", allow_negative_numbers = true)]
     noise: Option<f64>,
     /// Blur what moves: how long the shutter is open, from 0 to 1 of the time to the next frame [default: as in the scene]

@@ -4,25 +4,29 @@ use std::mem::take;
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
-use super::adaptive::{Effort, Noise};
+use super::adaptive::{Cells, Effort, Noise, Sums};
 use super::coverage::Coverage;
 use super::layers::LayerWork;
 use crate::accel::{Counts, PACKETS};
 use crate::film::Window;
 use crate::integrate::{
-    CameraRays, Direct, PixelPattern, RayCounts, RayKind, Record, Room, Samples, Samples8, Silent, Spent, Summed,
-    Taken, WAVE, Wave,
+    CameraRays, Direct, PixelPattern, RayCounts, RayKind, Record, Room, Samples, Samples8, Spent, Summed, Taken, WAVE,
+    Wave,
 };
 use crate::lanes::{LANES, Vec3x8};
 use crate::plan::{LeftOut, Skip};
 
 /// Pixels along an edge.
 pub const EDGE: i32 = 32;
+/// Pixels along an edge of the tiles that are sampled to a noise level, and of their cells.
+const TILE: i32 = 64;
+const CELL: i32 = 8;
 
-/// A square of pixels that one thread renders.
+/// A square of pixels that one thread renders, or the part of it that lies in the picture.
 #[derive(Debug, Clone, Copy)]
 pub struct Block {
     pub window: Window,
+    edge: i32,
 }
 
 /// What a block came to.
@@ -57,31 +61,52 @@ const BATCH: usize = 32;
 
 impl Block {
     pub fn new(window: Window) -> Self {
-        Block { window }
+        Block { window, edge: EDGE }
     }
 
     /// Blocks that cover a window, on the display window's own grid.
     pub fn cover(window: Window) -> Vec<Block> {
-        let starts = |from: i32, to: i32| (from.div_euclid(EDGE)..=(to - 1).div_euclid(EDGE)).map(|i| i * EDGE);
-        let block = |x: i32, y: i32| Window {
+        Block::squares(window, EDGE)
+    }
+
+    /// Tiles to be sampled to a noise level that cover a window, on the display window's own grid.
+    pub fn tiles(window: Window) -> Vec<Block> {
+        Block::squares(window, TILE)
+    }
+
+    fn squares(window: Window, edge: i32) -> Vec<Block> {
+        let starts = |from: i32, to: i32| (from.div_euclid(edge)..=(to - 1).div_euclid(edge)).map(move |i| i * edge);
+        let part = |x: i32, y: i32| Window {
             x0: x.max(window.x0),
             y0: y.max(window.y0),
-            x1: (x + EDGE).min(window.x1),
-            y1: (y + EDGE).min(window.y1),
+            x1: (x + edge).min(window.x1),
+            y1: (y + edge).min(window.y1),
         };
-        let row = |y| starts(window.x0, window.x1).map(move |x| Block::new(block(x, y)));
+        let row = |y| starts(window.x0, window.x1).map(move |x| Block { window: part(x, y), edge });
         starts(window.y0, window.y1).flat_map(row).collect()
+    }
+
+    /// The cells of a tile, and their pixels.
+    pub fn cells(&self) -> (Vec<Block>, Cells) {
+        let cells = Block::squares(self.window, CELL);
+        let pixels = |cell: &Block| {
+            let places = (0..cell.window.area()).map(|index| cell.window.pixel(index));
+            places.filter_map(|(x, y)| self.window.index(x, y)).collect()
+        };
+        let pixels = cells.iter().map(pixels).collect();
+        (cells, Cells { columns: self.window.width() / CELL as usize, pixels })
     }
 
     /// The whole square of the grid that it is a part of.
     pub fn whole(&self) -> Block {
-        let (x0, y0) = (self.window.x0.div_euclid(EDGE) * EDGE, self.window.y0.div_euclid(EDGE) * EDGE);
-        Block::new(Window { x0, y0, x1: x0 + EDGE, y1: y0 + EDGE })
+        let Block { window, edge } = *self;
+        let (x0, y0) = (window.x0.div_euclid(edge) * edge, window.y0.div_euclid(edge) * edge);
+        Block { window: Window { x0, y0, x1: x0 + edge, y1: y0 + edge }, edge }
     }
 
-    /// The smallest window of whole squares around another.
+    /// The smallest window of whole tiles, and so of whole blocks, around another.
     pub fn hull(window: Window) -> Window {
-        let [low, high] = [|at: i32| at.div_euclid(EDGE) * EDGE, |at: i32| -(-at).div_euclid(EDGE) * EDGE];
+        let [low, high] = [|at: i32| at.div_euclid(TILE) * TILE, |at: i32| -(-at).div_euclid(TILE) * TILE];
         Window { x0: low(window.x0), y0: low(window.y0), x1: high(window.x1), y1: high(window.y1) }
     }
 
@@ -96,8 +121,25 @@ impl Block {
         record: &mut R,
         stop: impl Fn() -> bool,
     ) -> Option<BlockWork> {
+        let (mut sums, share) = (vec![[0.0; 4]; self.window.area()], 1.0 / range.len() as f64);
+        let mut work = self.add(&mut sums, self.window, view, direct, range, record, stop)?;
+        work.pixels = sums.into_iter().map(|sum| sum.map(|x| (x * share) as f32)).collect();
+        Some(work)
+    }
+
+    /// The same, added to the sums of a frame around it; without means.
+    #[allow(clippy::too_many_arguments)]
+    fn add<R: Record>(
+        &self,
+        sums: &mut [[f64; 4]],
+        frame: Window,
+        view: &View,
+        direct: &Direct,
+        range: Range<u32>,
+        record: &mut R,
+        stop: impl Fn() -> bool,
+    ) -> Option<BlockWork> {
         let (window, View { rays, coverage, rooms }) = (self.window, *view);
-        let sums = vec![[0f64; 4]; window.area()];
         let may_pass = coverage.is_some() && record.passes_blanks();
         let blank = if may_pass { direct.blank() } else { None };
         let before = (Counts::default(), RayCounts::default());
@@ -105,16 +147,18 @@ impl Block {
         let mut work = Work { rays, direct, record, sums, room, before, tiles: 0, background_tiles: 0 };
         let draws = R::ON || rays.draws() || direct.draws();
         let (mut batch, mut blank_samples) = (Batch::default(), 0);
-        for code in 0..(EDGE * EDGE) as u32 {
+        let edge = window.width().max(window.height()).next_power_of_two() as u32;
+        for code in 0..edge * edge {
             let (x, y) = (window.x0 + compact(code), window.y0 + compact(code >> 1));
-            let Some(index) = window.index(x, y) else { continue };
+            let Some(index) = window.index(x, y).and_then(|_| frame.index(x, y)) else { continue };
             if code % 32 == 0 && stop() {
                 return None;
             }
             let sees = coverage.is_none_or(|coverage| coverage.sees(x, y));
             if let (false, Some(blank)) = (sees, &blank) {
                 // So many equal numbers of 24 bits sum up exactly.
-                work.sums[index] = blank.map(|x| f64::from(x) * range.len() as f64);
+                let (sum, count) = (&mut work.sums[index], range.len() as f64);
+                (0..4).for_each(|k| sum[k] += f64::from(blank[k]) * count);
                 blank_samples += range.len() as u64;
                 continue;
             }
@@ -131,11 +175,9 @@ impl Block {
         }
         work.tile(&mut batch);
         work.finish(&mut batch);
-        let share = 1.0 / range.len() as f64;
-        let pixels = work.sums.into_iter().map(|sum| sum.map(|x| (x * share) as f32)).collect();
         let blank_tiles = blank_samples.div_ceil(WAVE as u64);
         let (tiles, background_tiles) = (work.tiles + blank_tiles, work.background_tiles + blank_tiles);
-        let mut room = work.room;
+        let (mut room, pixels) = (work.room, Vec::new());
         let (tests, rays) = (take(&mut room.walk.counts), take(&mut room.rays));
         let mut left_out = take(&mut room.left_out);
         rooms.give(room);
@@ -150,33 +192,28 @@ impl Block {
         rows.flat_map(|row| &pixels[row]).copied().collect()
     }
 
-    /// The square that it is a part of, sampled until it is good enough, while a record looks on with the first
-    /// samples; all is of that square. `views` are those of each half of the samples.
+    /// The square that it is a part of, sampled until it is good enough, while a record looks on; all is of that square.
     pub fn trace_until<R: Record>(
         &self,
         noise: &Noise,
-        views: [View; 2],
+        view: &View,
         direct: &Direct,
         record: &mut R,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<BlockWork> {
         let whole = self.whole();
-        let mut sum: Option<BlockWork> = None;
-        let draw = |half: usize, range: Range<u32>| match &mut sum {
-            None => {
-                let mut work = whole.trace(&views[half], direct, range, record, stop)?;
-                let pixels = take(&mut work.pixels);
-                sum = Some(work);
-                Some(pixels)
+        let (cells, pixels) = whole.cells();
+        let mut all: Option<BlockWork> = None;
+        let draw = |cell: usize, sums: &mut Sums, range: Range<u32>| {
+            let work = cells[cell].add(sums, whole.window, view, direct, range, record, stop)?;
+            match &mut all {
+                None => all = Some(work),
+                Some(all) => all.absorb(&work),
             }
-            Some(sum) => {
-                let work = whole.trace(&views[half], direct, range, &mut Silent, stop)?;
-                sum.absorb(&work);
-                Some(work.pixels)
-            }
+            Some(())
         };
-        let (pixels, effort) = noise.sample(draw)?;
-        sum.map(|work| BlockWork { pixels, effort: Some(effort), ..work })
+        let (pixels, effort) = noise.sample(&pixels, draw)?;
+        all.map(|work| BlockWork { pixels, effort: Some(effort), ..work })
     }
 
     /// The part of a block's pixels and layers that lies in this one.
@@ -219,7 +256,7 @@ struct Work<'a, 's, R: Record> {
     rays: &'a CameraRays,
     direct: &'a Direct<'s>,
     record: &'a mut R,
-    sums: Vec<[f64; 4]>,
+    sums: &'a mut [[f64; 4]],
     room: Room,
     /// Tests and rays that a record was told of already.
     before: (Counts, RayCounts),
@@ -288,7 +325,7 @@ impl<R: Record> Work<'_, '_, R> {
         if self.direct.goes_on() {
             self.direct.trace_later(&mut self.room, self.record);
         }
-        batch.add_to(&self.room.samples, &mut self.sums);
+        batch.add_to(&self.room.samples, self.sums);
         if R::SURFACES {
             let (count, pixels, samples) = (batch.traced, &batch.pixels[..], &self.room.samples);
             self.record.summed(&Summed { count, pixels, samples });

@@ -37,7 +37,6 @@ use crate::integrate::{CameraRays, Direct, Lamps, RayCounts, Record};
 use crate::output::{self, Description, Losses, Options, OutputError};
 use crate::plan::{InvalidScene, Plan, Sight, Skip, SkipSet, validate};
 use crate::reference::Reference;
-use crate::sample;
 use crate::scene::{Aov, Camera, ImageSettings, Integrator, Layers, RenderSettings, Scene, SceneSum};
 
 /// Which tracer finds the hits.
@@ -216,8 +215,9 @@ impl<'s> Renderer<'s> {
         self
     }
 
-    /// Samples each tile of 32 x 32 pixels until its estimated relative error is no larger, from the samples per
-    /// pixel in force on up to 4,096: the same bits in any crop. `None`, or nothing above 0: as many samples for all.
+    /// Samples each tile of 64 x 64 pixels until its estimated relative error is no larger: each cell of 8 x 8 pixels with
+    /// 8, 16, 32 ... up to 4,096 samples, most where they help most. Each pixel has the bits that it would have with as
+    /// many samples for all, in any crop. `None`, or nothing above 0: as many samples for all.
     pub fn noise(mut self, target: Option<f64>) -> Self {
         self.settings.noise = target.filter(|target| *target > 0.0);
         self
@@ -429,7 +429,7 @@ impl<'s> Renderer<'s> {
     }
 
     fn noise_level(&self) -> Option<Noise> {
-        self.settings.noise.map(|target| Noise::new(target, self.image.spp))
+        self.settings.noise.map(|target| Noise { target })
     }
 
     fn checked_window(&self) -> Result<Window, RenderError> {
@@ -463,8 +463,6 @@ pub struct Frame<'s> {
     /// Tells margins, where those are asked for.
     judge: Option<Reference>,
     rays: CameraRays,
-    /// Those of the other half of the samples, to a noise level.
-    other_rays: Option<CameraRays>,
     noise: Option<Noise>,
     spp: u32,
     settings: RenderSettings,
@@ -497,9 +495,7 @@ impl<'s> Frame<'s> {
         let noise = renderer.noise_level();
         // A single sample would sit at the centre.
         let spp = if noise.is_some() { image.spp.max(2) } else { image.spp };
-        let rays = |seed| CameraRays::new(camera, plan.origin, display, image.filter, spp, seed);
-        let other_rays = noise.map(|_| rays(sample::other_seed(seed)));
-        let rays = rays(seed);
+        let rays = CameraRays::new(camera, plan.origin, display, image.filter, spp, seed);
         let (settings, axis) = (renderer.settings.clone(), camera.view_axis());
         Frame {
             plan,
@@ -509,7 +505,6 @@ impl<'s> Frame<'s> {
             rooms: Rooms::default(),
             judge,
             rays,
-            other_rays,
             noise,
             spp: image.spp,
             settings,
@@ -542,11 +537,6 @@ impl<'s> Frame<'s> {
 
     fn view(&self) -> View<'_> {
         View { rays: &self.rays, coverage: self.coverage.as_ref(), rooms: &self.rooms }
-    }
-
-    /// Of each half of the samples, to a noise level.
-    fn views(&self) -> [View<'_>; 2] {
-        [self.view(), View { rays: self.other_rays.as_ref().unwrap_or(&self.rays), ..self.view() }]
     }
 
     fn direct(&self) -> Direct<'_> {

@@ -26,8 +26,11 @@ pub(super) fn samples(moment: usize, moments: usize, spp: u32) -> Range<u32> {
     edge(moment)..edge(moment + 1)
 }
 
-/// The moment that a sample belongs to.
+/// The moment that a sample belongs to; the only one where there is but one, however many samples there are.
 pub(super) fn moment(sample: u32, moments: usize, spp: u32) -> usize {
+    if moments == 1 {
+        return 0;
+    }
     (((u64::from(sample) + 1) * moments as u64 - 1) / u64::from(spp)) as usize
 }
 

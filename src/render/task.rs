@@ -89,7 +89,8 @@ impl<'s> Task<'s> {
             (Engine::Reference, None) => Work::Rows(Box::new(Rows::new(renderer, window))),
             (Engine::Packet | Engine::Single, _) => {
                 let frames = renderer.at_moments().iter().map(Frame::prepare).collect();
-                Work::Blocks(frames, Block::cover(window))
+                let blocks = if renderer.noise_level().is_some() { Block::tiles(window) } else { Block::cover(window) };
+                Work::Blocks(frames, blocks)
             }
         };
         let display = (renderer.image.width, renderer.image.height);
@@ -202,7 +203,7 @@ impl<'s> Task<'s> {
         all.map(|all| BlockWork { pixels, ..all })
     }
 
-    /// To a noise level: layers are those of the first samples.
+    /// To a noise level.
     fn trace_until(
         &self,
         frames: &[Frame],
@@ -210,13 +211,13 @@ impl<'s> Task<'s> {
         block: &Block,
         stop: &(dyn Fn() -> bool + Sync),
     ) -> Option<BlockWork> {
-        let (whole, direct, views) = (block.whole(), frames[0].direct(), frames[0].views());
+        let (whole, direct, view) = (block.whole(), frames[0].direct(), frames[0].view());
         let mut work = match &self.layers {
-            None => block.trace_until(noise, views, &direct, &mut Silent, stop)?,
+            None => block.trace_until(noise, &view, &direct, &mut Silent, stop)?,
             Some(plan) => {
                 let mut tape = LayerTape::new(frames, plan, whole.window.area());
-                let work = block.trace_until(noise, views, &direct, &mut tape, stop)?;
-                tape.took(&vec![noise.fewest; whole.window.area()]);
+                let work = block.trace_until(noise, &view, &direct, &mut tape, stop)?;
+                work.effort.iter().for_each(|effort| tape.took(&effort.samples));
                 let mut layers = tape.finish(whole.window);
                 work.effort.iter().for_each(|effort| plan.tell_effort(effort, &mut layers));
                 BlockWork { layers: Some(layers), ..work }

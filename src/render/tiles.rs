@@ -3,21 +3,18 @@
 use std::ops::Range;
 use std::time::Instant;
 
-use super::adaptive::{Effort, Noise, Pixels};
+use super::adaptive::{Effort, Noise, Pixels, Sums};
 use super::block::Block;
 use super::reference::add;
 use super::{Renderer, Stats};
 use crate::film::Window;
 use crate::integrate::RayCounts;
 use crate::reference::{Reference, View};
-use crate::sample;
-use crate::scene::RenderSettings;
 
 /// A frame whose squares are its blocks.
 pub(super) struct Tiles {
     tracer: Reference,
-    /// One for each half of the samples.
-    views: [View; 2],
+    view: View,
     noise: Noise,
     blocks: Vec<Block>,
     plan_seconds: f64,
@@ -40,11 +37,9 @@ impl Tiles {
         let tracer = Reference::relative_to(renderer.scene, renderer.camera.eye);
         let mut image = renderer.image.clone();
         image.spp = image.spp.max(2); // or all samples would sit at the centre
-        let seed = renderer.settings.seed;
-        let view = |seed| tracer.view(renderer.camera, &image, &RenderSettings { seed, ..renderer.settings.clone() });
-        let views = [view(seed), view(sample::other_seed(seed))];
-        let blocks = Block::cover(window);
-        Tiles { tracer, views, noise, blocks, plan_seconds: start.elapsed().as_secs_f64() }
+        let view = tracer.view(renderer.camera, &image, &renderer.settings);
+        let blocks = Block::tiles(window);
+        Tiles { tracer, view, noise, blocks, plan_seconds: start.elapsed().as_secs_f64() }
     }
 
     pub fn blocks(&self) -> &[Block] {
@@ -55,18 +50,17 @@ impl Tiles {
     pub fn trace(&self, index: usize, stop: &(dyn Fn() -> bool + Sync)) -> Option<TileWork> {
         let (block, mut counts) = (self.blocks[index], RayCounts::default());
         let whole = block.whole();
-        let mut pixel = |half: usize, range: &Range<u32>, (x, y)| {
-            if stop() {
-                return None;
-            }
-            let pixel = self.tracer.samples(&self.views[half], x, y, range.clone());
+        let mut add_to = |sum: &mut [f64; 4], range: &Range<u32>, (x, y)| {
+            let pixel = (!stop()).then(|| self.tracer.samples(&self.view, x, y, range.clone()))?;
             add(&mut counts, &pixel);
-            Some(pixel.rgba.map(|mean| mean as f32))
+            *sum = std::array::from_fn(|k| sum[k] + pixel.rgba[k] * range.len() as f64);
+            Some(())
         };
-        let draw = |half: usize, range: Range<u32>| {
-            (0..whole.window.area()).map(|i| pixel(half, &range, whole.window.pixel(i))).collect()
+        let (_, cells) = whole.cells();
+        let draw = |cell: usize, sums: &mut Sums, range: Range<u32>| {
+            cells.pixels[cell].iter().try_for_each(|i| add_to(&mut sums[*i], &range, whole.window.pixel(*i)))
         };
-        let (pixels, effort) = self.noise.sample(draw)?;
+        let (pixels, effort) = self.noise.sample(&cells, draw)?;
         Some(TileWork { block, pixels: block.part(&whole, &pixels), effort, counts })
     }
 

@@ -23,7 +23,7 @@ pub struct RenderSettings {
     /// Chooses the sample pattern.
     pub seed: u64,
     /// Relative error of each tile at which sampling stops, > 0; `None`: all pixels have as many samples as the
-    /// picture says. With it those are what each pixel has at least.
+    /// picture says.
     pub noise: Option<f64>,
     /// How far occluders count in ambient occlusion, scene units, > 0; may be infinite.
     pub ao_distance: f64,

@@ -94,9 +94,8 @@ struct Way<'a> {
     adaptive: bool,
 }
 
-/// The first noise level, and the least samples of a pixel under any.
-const COARSE: f64 = 0.4;
-const LEAST: u32 = 4;
+/// The first noise level.
+const COARSE: f64 = 0.1;
 
 /// Renders a scene in many ways; `tell` hears of each as it is done.
 ///
@@ -166,7 +165,7 @@ impl Way<'_> {
         let renderer = Renderer::new(scene)?.engine(self.engine).certify(self.certified).threads(settings.threads);
         // Half the noise where twice as many samples would give about that much less.
         let level = self.adaptive.then(|| COARSE / f64::from(spp).sqrt());
-        Ok(renderer.spp(if self.adaptive { LEAST } else { spp }).noise(level))
+        Ok(renderer.spp(spp).noise(level))
     }
 
     fn filtered(&self) -> Scene {

@@ -173,7 +173,9 @@ impl<'s> LayerPlan<'s> {
             let (own, rest) = take(&mut channels).split_at_mut(self.channels_of(aov).len());
             for (part, samples) in own.iter_mut().enumerate() {
                 match aov {
-                    Aov::Samples => *samples = Samples::Float(vec![effort.samples as f32; samples.len()]),
+                    Aov::Samples => {
+                        *samples = Samples::Float(effort.samples.iter().map(|samples| *samples as f32).collect())
+                    }
                     Aov::Variance => {
                         *samples = Samples::Float(effort.variance.iter().map(|variance| variance[part]).collect());
                     }

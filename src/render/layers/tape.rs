@@ -60,14 +60,14 @@ impl<'a, 's> LayerTape<'a, 's> {
         LayerTape { frames, plan, axis, sums: Sums::new(plan, pixels, spp), whole, tile: Default::default() }
     }
 
-    /// How many samples each pixel had, where that was not known before.
-    pub fn took(&mut self, samples: &[u32]) {
-        self.sums.took(samples);
-    }
-
     /// What comes next is seen at this moment.
     pub fn at(&mut self, moment: usize) {
         self.axis = self.frames[moment].axis.map(|axis| axis.as_vec3().to_array());
+    }
+
+    /// How many samples each pixel had, where that was not known before.
+    pub fn took(&mut self, samples: &[u32]) {
+        self.sums.took(samples);
     }
 
     /// The layers of the block that was rendered.
