@@ -116,7 +116,7 @@ fn bits(picture: &Picture) -> Vec<(String, Vec<u32>)> {
     let color = ("RGBA".to_owned(), picture.pixels.iter().flatten().map(|x| x.to_bits()).collect());
     let channel = |channel: &Channel| match &channel.samples {
         Samples::Half(all) | Samples::Float(all) => (channel.name.clone(), all.iter().map(|x| x.to_bits()).collect()),
-        Samples::Uint(all) => (channel.name.clone(), all.clone()),
+        Samples::Uint(all) => (channel.name.clone(), all.to_vec()),
     };
     std::iter::once(color).chain(picture.channels.iter().map(channel)).collect()
 }

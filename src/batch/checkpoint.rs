@@ -156,7 +156,7 @@ fn decode(bytes: &[u8]) -> Option<(Head, Picture)> {
     };
     let mut picture = Picture::new(head.display, window);
     let values: Vec<f32> = words(4 * area).into_iter().map(f32::from_le_bytes).collect();
-    picture.pixels = values.as_chunks::<4>().0.to_vec();
+    picture.pixels = values.as_chunks::<4>().0.to_vec().into();
     for (name, kind) in &head.channels {
         let words = words(area);
         let floats = || words.iter().copied().map(f32::from_le_bytes).collect();

@@ -109,7 +109,7 @@ impl<'p> Strip<'p> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Channel;
+    use super::super::{Channel, Plane};
     use super::*;
 
     /// A picture of the same pixels and channels, all 0.
@@ -133,7 +133,7 @@ mod tests {
         let mut whole = Picture::new((16, 16), window);
         whole.pixels.iter_mut().enumerate().for_each(|(i, pixel)| *pixel = [i as f32, 1.0, 2.0, 3.0]);
         let numbers = 0..window.area() as u32;
-        let floats: Vec<f32> = numbers.clone().map(|i| i as f32).collect();
+        let floats: Plane<f32> = numbers.clone().map(|i| i as f32).collect();
         let mut channel = |name: &str, samples| whole.channels.push(Channel { name: name.into(), samples });
         channel("depth.Z", Samples::Float(floats.clone()));
         channel("id.object", Samples::Uint(numbers.collect()));

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use super::Plane;
+
 /// A channel of a picture beside red, green, blue and alpha.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {
@@ -15,11 +17,11 @@ pub struct Channel {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Samples {
     /// 16-bit floats; held here in 32, rounded when written.
-    Half(Vec<f32>),
+    Half(Plane<f32>),
     /// 32-bit floats, also where colour is stored in 16.
-    Float(Vec<f32>),
+    Float(Plane<f32>),
     /// 32-bit unsigned integers.
-    Uint(Vec<u32>),
+    Uint(Plane<u32>),
 }
 
 impl Samples {
@@ -74,6 +76,6 @@ impl Channel {
     }
 }
 
-fn pick<T: Copy>(samples: &[T], rows: &[Range<usize>]) -> Vec<T> {
+fn pick<T: Copy>(samples: &[T], rows: &[Range<usize>]) -> Plane<T> {
     rows.iter().flat_map(|row| &samples[row.clone()]).copied().collect()
 }

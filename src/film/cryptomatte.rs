@@ -109,7 +109,7 @@ mod tests {
         let manifest = ["a", "b"].map(|name| (name.to_owned(), Cryptomatte::id(name))).into();
         let matte = Cryptomatte { name: "crypto_object".into(), manifest };
         let ids = vec![f32::from_bits(Cryptomatte::id("b")), 0.0];
-        let channel = |name: &str| Channel { name: name.into(), samples: Samples::Float(ids.clone()) };
+        let channel = |name: &str| Channel { name: name.into(), samples: Samples::Float(ids.clone().into()) };
         let present = |name: &str| matte.present(&[channel(name)]).manifest.into_keys().collect::<Vec<_>>();
         assert_eq!(present("crypto_object00.R"), ["b"]);
         assert_eq!(present("crypto_object00.G"), Vec::<String>::new());

@@ -1,6 +1,6 @@
 //! Crops of one frame, joined to the whole.
 
-use super::{Channel, Cryptomatte, Picture, Samples, Window};
+use super::{Channel, Cryptomatte, Picture, Plane, Samples, Window};
 
 /// Why crops do not make a frame. Parts are told by their number, from 0.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -108,9 +108,9 @@ fn same_layers(part: usize, picture: &Picture, first: &Picture) -> Result<(), Jo
 
 fn blank(channel: &Channel, area: usize) -> Channel {
     let samples = match channel.samples {
-        Samples::Half(_) => Samples::Half(vec![0.0; area]),
-        Samples::Float(_) => Samples::Float(vec![0.0; area]),
-        Samples::Uint(_) => Samples::Uint(vec![0; area]),
+        Samples::Half(_) => Samples::Half(Plane::zeroed(area)),
+        Samples::Float(_) => Samples::Float(Plane::zeroed(area)),
+        Samples::Uint(_) => Samples::Uint(Plane::zeroed(area)),
     };
     Channel { name: channel.name.clone(), samples }
 }
@@ -199,12 +199,12 @@ mod tests {
         };
         assert_eq!(with(&|parts| drop(parts.pop())), JoinError::Missing { x: -1, y: 2, more: 8 });
         assert_eq!(with(&|parts| parts[1].pixels[0][2] = 0.0), JoinError::Overlap { part: 1, x: 2, y: 0 });
-        let id = |parts: &mut Vec<Picture>| parts[1].channels[0].samples = Samples::Uint(vec![9; 20]);
+        let id = |parts: &mut Vec<Picture>| parts[1].channels[0].samples = Samples::Uint(vec![9; 20].into());
         assert_eq!(with(&id), JoinError::Overlap { part: 1, x: 2, y: 0 });
         assert!(matches!(with(&|parts| parts[2].display = (6, 6)), JoinError::Frame { part: 2, .. }));
         let fewer = with(&|parts| drop(parts[1].channels.pop()));
         assert_eq!(fewer, JoinError::Layers { part: 1, name: "crypto_object00.R".into(), has: false });
-        let other = with(&|parts| parts[2].channels[0].samples = Samples::Float(vec![0.0; 9]));
+        let other = with(&|parts| parts[2].channels[0].samples = Samples::Float(vec![0.0; 9].into()));
         assert_eq!(other, JoinError::Layers { part: 2, name: "id.object".into(), has: true });
     }
 }

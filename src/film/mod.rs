@@ -9,9 +9,11 @@ mod channel;
 mod cryptomatte;
 mod join;
 mod picture;
+mod plane;
 
 pub use self::band::Band;
 pub use self::channel::{Channel, Samples};
 pub use self::cryptomatte::Cryptomatte;
 pub use self::join::JoinError;
 pub use self::picture::{Picture, Window};
+pub use self::plane::Plane;

@@ -2,6 +2,7 @@
 
 use super::channel::Channel;
 use super::cryptomatte::Cryptomatte;
+use super::plane::Plane;
 
 /// A rectangle of pixels, half open: `x0 <= x < x1`, `y0 <= y < y1`; x right, y down, the first pixel
 /// of the display window at (0, 0). Empty where `x1 <= x0` or `y1 <= y0`.
@@ -89,7 +90,7 @@ pub struct Picture {
     pub window: Window,
     /// Red, green, blue, alpha of each pixel of the window, row by row from the top. Radiance has no
     /// upper bound, alpha is in 0..1, colour is already multiplied by alpha.
-    pub pixels: Vec<[f32; 4]>,
+    pub pixels: Plane<[f32; 4]>,
     /// Layers beside the colour, in no order that means anything; no name occurs twice.
     pub channels: Vec<Channel>,
     /// What the Cryptomatte channels among them stand for.
@@ -99,7 +100,7 @@ pub struct Picture {
 impl Picture {
     /// A picture of transparent black, without layers.
     pub fn new(display: (u32, u32), window: Window) -> Self {
-        let pixels = vec![[0.0; 4]; window.area()];
+        let pixels = Plane::zeroed(window.area());
         Picture { display, window, pixels, channels: Vec::new(), cryptomattes: Vec::new() }
     }
 
@@ -184,7 +185,7 @@ mod tests {
         let window = Window { x0: 2, y0: 1, x1: 5, y1: 3 };
         let part = picture.crop(window).expect("inside");
         let ids = part.channel("id.object").map(|channel| &channel.samples);
-        assert_eq!(ids, Some(&Samples::Uint(vec![8, 9, 10, 14, 15, 16])));
+        assert_eq!(ids, Some(&Samples::Uint(vec![8, 9, 10, 14, 15, 16].into())));
         assert_eq!(part.display, (6, 4));
         for index in 0..window.area() {
             let (x, y) = window.pixel(index);
@@ -210,7 +211,7 @@ mod tests {
     fn a_channel_that_is_too_short_is_seen() {
         let mut picture = Picture::new((2, 2), Window::full((2, 2)));
         assert!(picture.is_whole());
-        picture.channels.push(Channel { name: "depth.Z".into(), samples: Samples::Float(vec![1.0; 3]) });
+        picture.channels.push(Channel { name: "depth.Z".into(), samples: Samples::Float(vec![1.0; 3].into()) });
         assert!(!picture.is_whole());
     }
 }

@@ -146,7 +146,8 @@ pub(super) fn pictures(pixels: &[PixelDifference], display: (u32, u32)) -> Layer
         ];
         channels.iter_mut().zip(values).for_each(|((_, samples), value)| samples[i] = value);
     }
-    let channel = |(name, samples): (&str, Vec<f32>)| Channel { name: name.into(), samples: Samples::Float(samples) };
+    let channel =
+        |(name, samples): (&str, Vec<f32>)| Channel { name: name.into(), samples: Samples::Float(samples.into()) };
     differences.channels = channels.into_iter().map(channel).collect();
     Layers { differences, engine, reference }
 }

@@ -265,7 +265,7 @@ mod tests {
     /// One sample of 12 pixels is off by 0.5, the others are equal.
     #[test]
     fn a_known_difference_is_found() {
-        let b = Picture { pixels: vec![[0.25, 0.25, 0.25, 1.0]; 12], ..noise(4, 3, 1) };
+        let b = Picture { pixels: vec![[0.25, 0.25, 0.25, 1.0]; 12].into(), ..noise(4, 3, 1) };
         let mut a = b.clone();
         a.pixels[6][1] = 0.75;
         let comparison = compare(&a, &b).unwrap();
@@ -337,7 +337,7 @@ mod tests {
         assert_eq!(message(&a, &b), "the pictures have different sizes: 16x8 and 8x16");
         let part = a.crop(Window { x0: 2, y0: 3, x1: 10, y1: 7 }).unwrap();
         assert_eq!(message(&a, &part), "the pictures cover different parts of the frame: 16x8 at 0,0 and 8x4 at 2,3");
-        let short = Picture { pixels: vec![[0.0; 4]; 3], ..a.clone() };
+        let short = Picture { pixels: vec![[0.0; 4]; 3].into(), ..a.clone() };
         assert_eq!(compare(&a, &short), Err(CompareError::Empty));
         assert_eq!(compare(&part, &part).unwrap().max.x, 2);
     }

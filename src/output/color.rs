@@ -146,7 +146,7 @@ mod tests {
             ("variance.G", 4.0),
             ("variance.B", 4.0),
         ] {
-            picture.channels.push(Channel { name: name.into(), samples: Samples::Float(vec![value]) });
+            picture.channels.push(Channel { name: name.into(), samples: Samples::Float(vec![value].into()) });
         }
         let there = converted(&picture, Primaries::REC709.matrix_to(Primaries::ACESCG).unwrap());
         let value = |picture: &Picture, name: &str| picture.channel(name).unwrap().samples.floats().unwrap()[0];

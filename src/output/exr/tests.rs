@@ -7,7 +7,7 @@ use glam::DVec3;
 use half::f16;
 
 use super::*;
-use crate::film::{Channel, Cryptomatte, Samples, Window};
+use crate::film::{Channel, Cryptomatte, Plane, Samples, Window};
 use crate::output::{self, Options, Run, description};
 use crate::scene::{Camera, Lens};
 
@@ -89,7 +89,7 @@ fn halves_come_back_as_the_nearest_ones() {
 #[test]
 fn what_a_sample_cannot_be_is_clamped_or_dropped_and_counted() {
     let mut picture = Picture::new((2, 1), Window::full((2, 1)));
-    picture.pixels = vec![[f32::NAN, f32::INFINITY, 65519.0, 1.0], [1e9, -1e9, f32::NEG_INFINITY, 65504.0]];
+    picture.pixels = vec![[f32::NAN, f32::INFINITY, 65519.0, 1.0], [1e9, -1e9, f32::NEG_INFINITY, 65504.0]].into();
     let (half, losses) = written_and_read(&picture, false);
     assert_eq!(half.pixels, [[0.0, 0.0, 65504.0, 1.0], [65504.0, -65504.0, 0.0, 65504.0]]);
     assert_eq!(losses, Losses { clamped: 3, dropped: 3 });
@@ -144,7 +144,7 @@ fn without_a_run_nothing_differs_between_runs() {
 fn a_picture_that_is_not_whole_is_refused() {
     let empty = Picture::new((4, 4), Window { x0: 2, y0: 2, x1: 2, y1: 4 });
     let mut short = picture();
-    short.pixels.pop();
+    short.pixels = short.pixels[1..].to_vec().into();
     let one = Window::full((1, 1));
     let far = Window { x0: i32::MAX - 1, y0: 0, x1: i32::MAX, y1: 1 };
     for picture in
@@ -158,8 +158,8 @@ fn a_picture_that_is_not_whole_is_refused() {
 fn layered() -> Picture {
     let mut picture = picture();
     let area = picture.window.area();
-    let floats = |factor: f32| (0..area).map(|i| factor * (i as f32 + 0.3)).collect::<Vec<_>>();
-    let ids = |name: &str| vec![f32::from_bits(Cryptomatte::id(name)); area];
+    let floats = |factor: f32| (0..area).map(|i| factor * (i as f32 + 0.3)).collect::<Plane<_>>();
+    let ids = |name: &str| Plane::from(vec![f32::from_bits(Cryptomatte::id(name)); area]);
     for (name, samples) in [
         ("depth.Z", Samples::Float(floats(0.37))),
         ("N.X", Samples::Half(floats(0.001))),
@@ -168,9 +168,9 @@ fn layered() -> Picture {
         ("id.object", Samples::Uint((0..area as u32).map(|i| i * 77_777_777).collect())),
         ("variance.R", Samples::Float(floats(1e-9))),
         ("crypto_object00.R", Samples::Float(ids("равнина"))),
-        ("crypto_object00.G", Samples::Float(vec![0.75; area])),
+        ("crypto_object00.G", Samples::Float(vec![0.75; area].into())),
         ("crypto_object00.B", Samples::Float(ids("torus"))),
-        ("crypto_object00.A", Samples::Float(vec![0.25; area])),
+        ("crypto_object00.A", Samples::Float(vec![0.25; area].into())),
     ] {
         picture.channels.push(Channel { name: name.into(), samples });
     }

@@ -17,7 +17,7 @@ use half::f16;
 
 use super::mattes;
 use super::{Contents, Fault, HashPair, check_length, check_pixels};
-use crate::film::{Channel, Picture, Samples, Window};
+use crate::film::{Channel, Picture, Plane, Samples, Window};
 use crate::output::color::{self, Primaries};
 use crate::output::exr::{Attributes, ColorSpace, PIXEL_HASH, Storage};
 use crate::output::pixel_hash::{Digests, PixelHash};
@@ -147,13 +147,13 @@ impl Plan {
         let channel = |(name, kind): &(String, SampleType)| Channel {
             name: name.clone(),
             samples: match kind {
-                SampleType::F16 => Samples::Half(vec![0.0; area]),
-                SampleType::F32 => Samples::Float(vec![0.0; area]),
-                SampleType::U32 => Samples::Uint(vec![0; area]),
+                SampleType::F16 => Samples::Half(Plane::zeroed(area)),
+                SampleType::F32 => Samples::Float(Plane::zeroed(area)),
+                SampleType::U32 => Samples::Uint(Plane::zeroed(area)),
             },
         };
         Picture {
-            pixels: vec![[0.0, 0.0, 0.0, 1.0]; area],
+            pixels: vec![[0.0, 0.0, 0.0, 1.0]; area].into(),
             channels: self.names.iter().map(channel).collect(),
             window: self.window,
             display: self.display,

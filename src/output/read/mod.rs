@@ -194,9 +194,9 @@ mod tests {
         let mut layered = picture();
         let area = layered.window.area();
         layered.channels = vec![
-            Channel { name: "depth.Z".into(), samples: Samples::Float(vec![2.5; area]) },
+            Channel { name: "depth.Z".into(), samples: Samples::Float(vec![2.5; area].into()) },
             Channel { name: "id.object".into(), samples: Samples::Uint((0..area as u32).collect()) },
-            Channel { name: "crypto_object00.R".into(), samples: Samples::Float(vec![1.5; area]) },
+            Channel { name: "crypto_object00.R".into(), samples: Samples::Float(vec![1.5; area].into()) },
         ];
         let manifest = [("ball".to_owned(), 1.5f32.to_bits())].into();
         layered.cryptomattes = vec![Cryptomatte { name: "crypto_object".into(), manifest }];

@@ -41,7 +41,7 @@ pub(super) fn read(reader: impl BufRead + Seek, length: usize) -> Result<(Pictur
         _ => linear::<1>(&samples, color, |[code]| srgb::from_u8(code), 255.0),
     };
     let display = (width, height);
-    let picture = Picture { pixels, ..Picture::new(display, Window::full(display)) };
+    let picture = Picture { pixels: pixels.into(), ..Picture::new(display, Window::full(display)) };
     Ok((picture, depth == BitDepth::Sixteen))
 }
 

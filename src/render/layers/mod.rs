@@ -24,7 +24,7 @@ pub(super) use self::tape::LayerTape;
 
 use super::adaptive::Effort;
 use super::{Renderer, shutter};
-use crate::film::{Channel, Cryptomatte, Picture, Samples};
+use crate::film::{Channel, Cryptomatte, Picture, Plane, Samples};
 use crate::scene::{Aov, Camera, Layers, Objects, Scene, carried};
 
 /// The depth of a miss: finite, so that filters do not spread infinity.
@@ -157,9 +157,9 @@ impl<'s> LayerPlan<'s> {
         let area = picture.window.area();
         let blank = |(name, kind): (String, Kind)| {
             let samples = match kind {
-                Kind::Half => Samples::Half(vec![0.0; area]),
-                Kind::Float => Samples::Float(vec![0.0; area]),
-                Kind::Uint => Samples::Uint(vec![0; area]),
+                Kind::Half => Samples::Half(Plane::zeroed(area)),
+                Kind::Float => Samples::Float(Plane::zeroed(area)),
+                Kind::Uint => Samples::Uint(Plane::zeroed(area)),
             };
             Channel { name, samples }
         };

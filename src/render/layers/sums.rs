@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use super::matte::{Rank, Tally, ranked};
 use super::near::{Batches, Near, Nearest};
 use super::{LayerPlan, MOST_MARGIN};
-use crate::film::Samples;
+use crate::film::{Plane, Samples};
 use crate::lanes::{Float8, LANES, Vec3x8};
 use crate::scene::Aov;
 use crate::shapes::RowRef;
@@ -94,8 +94,8 @@ impl Filtered {
     /// Means of so many samples each.
     fn means(self, spp: u32, took: &[u32]) -> [Samples; 3] {
         match self {
-            Filtered::Unasked => [(); 3].map(|()| Samples::Half(Vec::new())),
-            Filtered::Single(columns) => columns.map(Samples::Half),
+            Filtered::Unasked => [(); 3].map(|()| Samples::Half(Plane::default())),
+            Filtered::Single(columns) => columns.map(|column| Samples::Half(column.into())),
             Filtered::Sums(sums) if took.is_empty() => {
                 let share = 1.0 / f64::from(spp);
                 sums.map(|sums| Samples::Half(sums.iter().map(|sum| (sum * share) as f32).collect()))
@@ -215,7 +215,7 @@ impl Sums {
         let places: Vec<_> = places.collect();
         for aov in plan.layers.iter() {
             match aov {
-                Aov::Depth => work.channels.push(Samples::Float(take(&mut self.nearest.depth))),
+                Aov::Depth => work.channels.push(Samples::Float(take(&mut self.nearest.depth).into())),
                 Aov::Position => (0..3).for_each(|k| work.floats(places.iter().map(|place| place.point[k] as f32))),
                 Aov::Normal => work.add_means(&mut self.normal, self.spp, &self.took),
                 Aov::Albedo => work.add_means(&mut self.albedo, self.spp, &self.took),
@@ -230,7 +230,7 @@ impl Sums {
                 }
                 Aov::Ids => {
                     let ids = [take(&mut self.nearest.objects), take(&mut self.nearest.materials)];
-                    work.channels.extend(ids.map(Samples::Uint));
+                    work.channels.extend(ids.map(|ids| Samples::Uint(ids.into())));
                 }
                 Aov::Samples => work.floats((0..self.pixels).map(|pixel| self.samples(pixel) as f32)),
                 Aov::Variance => {
@@ -263,7 +263,7 @@ impl Sums {
         }
         work.seen[index].sort_unstable();
         work.seen[index].dedup();
-        work.channels.extend(columns.into_iter().map(Samples::Float));
+        work.channels.extend(columns.into_iter().map(|column| Samples::Float(column.into())));
     }
 }
 
