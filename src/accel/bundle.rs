@@ -2,7 +2,7 @@
 
 use super::node::{Beam, OUTWARD, least_direction, near_planes};
 use super::tile::{PACKETS, Tile};
-use crate::lanes::{Columns, Float8, Mask8, RayPacket, UNIT_ROUNDOFF, Vec3x8, float8, greatest, least};
+use crate::lanes::{Float8, Mask8, RayPacket, UNIT_ROUNDOFF, Vec3x8, bits, float8, greatest, least};
 
 /// Bounds of origins, directions and ends of eight packets, a lane a packet.
 #[derive(Debug)]
@@ -26,48 +26,68 @@ struct Interval {
 const SPREAD: f32 = 0.05;
 
 impl Bundle {
-    /// Bounds of the packets of `live`. Rays that ask for `ANY` hit may be looked at from their ends, where those are
-    /// closer together: shadow rays of a light.
+    /// Bounds of the packets of `live`. Rays that ask for `ANY` hit are taken with directions of length 1, whatever they
+    /// are, and seen from where they are closest together.
     pub fn new<const ANY: bool>(tile: &Tile, live: u32) -> Self {
         let packets = &tile.packets;
         let start = packets.iter().map(|rays| rays.t_min).reduce(Float8::fast_min).map_or(0.0, least);
-        let far = by_packet(|p| packets[p].t_max, Float8::fast_max);
         let full = packets.iter().map(|rays| rays.live()).reduce(|a, b| a & b).is_some_and(Mask8::all);
-        if full && (!ANY || tile.common.is_some()) {
-            let origins = match tile.common {
-                Some(origin) => origin.map(|x| Interval { low: float8(x), high: float8(x) }),
-                None => intervals(|p| packets[p].origin),
-            };
-            return Bundle { origins, dirs: intervals(|p| packets[p].dir), start, far };
-        }
         // Dead lanes stand where a live one of theirs does.
-        let lanes: [(Vec3x8, Vec3x8); PACKETS] = std::array::from_fn(|p| packets[p].filled());
-        let (origins, dirs) = (intervals(|p| lanes[p].0), intervals(|p| lanes[p].1));
-        let bundle = Bundle { origins, dirs, start, far };
-        let finite = greatest(far) < f32::INFINITY && start >= 0.0;
-        if ANY && tile.common.is_none() && finite { bundle.or_from_ends(live, &lanes) } else { bundle }
+        let filled: [RayPacket; PACKETS];
+        let rays = if full {
+            packets
+        } else {
+            filled = std::array::from_fn(|p| packets[p].filled());
+            &filled
+        };
+        let measured = |p: usize| Mask8::le(rays[p].inv_dd, rays[p].inv_dd).all();
+        if ANY && start >= 0.0 && bits(live).all(measured) {
+            return Bundle::of_ways(rays, tile.common, live);
+        }
+        let far = by_packet(|p| packets[p].t_max, Float8::fast_max);
+        Bundle { origins: origins(rays, tile.common), dirs: intervals(|p| rays[p].dir), start, far }
+    }
+
+    /// Places on the rays are distances. Directions are widened by what their length rounds, and origins that are moved
+    /// by what moving them does.
+    fn of_ways(rays: &[RayPacket; PACKETS], common: Option<[f32; 3]>, live: u32) -> Self {
+        let slack = float8(4.0 * UNIT_ROUNDOFF);
+        let units: [Vec3x8; PACKETS] = std::array::from_fn(|p| rays[p].dir * rays[p].inv_dd.sqrt());
+        let far = by_packet(|p| rays[p].t_max * rays[p].dir.length(), Float8::fast_max);
+        let far = Mask8::gt(far, Float8::ZERO).select(far.mul_add(slack, far), far);
+        let dirs = intervals(|p| units[p]).map(|axis| axis.widened(axis.size() * slack));
+        let bundle = Bundle { origins: origins(rays, common), dirs, start: 0.0, far };
+        if common.is_some() {
+            return bundle;
+        }
+        let is_finite = greatest(Mask8::from_bits(live).select(far, Float8::ZERO)) < f32::INFINITY;
+        let other = if is_finite { bundle.backwards(rays) } else { bundle.across(rays, &units, live) };
+        let width = |of: &Bundle| widest(&merged(&of.origins, live)).as_array()[0];
+        if width(&other) < width(&bundle) { other } else { bundle }
+    }
+
+    /// The same rays from their ends back: shadow rays of a light.
+    fn backwards(&self, rays: &[RayPacket; PACKETS]) -> Self {
+        let ends = intervals(|p| rays[p].dir.mul_add(rays[p].t_max, rays[p].origin));
+        let moved = [0, 1, 2].map(|k| self.far.mul_add(self.dirs[k].size(), self.origins[k].size()));
+        let back = self.dirs.map(|Interval { low, high }| Interval { low: -high, high: -low });
+        Bundle { origins: widened(&ends, &moved), dirs: back, ..*self }
+    }
+
+    /// The same rays from a plane across them on, behind all their origins: those of a distant light.
+    fn across(&self, rays: &[RayPacket; PACKETS], units: &[Vec3x8; PACKETS], live: u32) -> Self {
+        let along: [Float8; PACKETS] = std::array::from_fn(|p| rays[p].origin.dot(units[p]));
+        let least_along = by_packet(|p| along[p], Float8::fast_min);
+        let plane = float8(least(Mask8::from_bits(live).select(least_along, float8(f32::INFINITY))));
+        let moved = intervals(|p| units[p].mul_add(plane - along[p], rays[p].origin));
+        let size = self.origins[0].size() + self.origins[1].size() + self.origins[2].size() + plane.abs();
+        Bundle { origins: widened(&moved, &[size; 3]), ..*self }
     }
 
     /// The rays of one packet, a lane a ray.
     pub fn of_rays(rays: &RayPacket) -> Self {
         let point = |v: &Vec3x8| [v.x, v.y, v.z].map(|x| Interval { low: x, high: x });
         Bundle { origins: point(&rays.origin), dirs: point(&rays.dir), start: least(rays.t_min), far: rays.t_max }
-    }
-
-    /// Where the ends are closer together than the origins, the same rays from there: `end - s (t_max dir)` for
-    /// `0 <= s < 1`, widened by what rounding moves the ends.
-    fn or_from_ends(self, live: u32, lanes: &[(Vec3x8, Vec3x8); PACKETS]) -> Self {
-        let ways: [Vec3x8; PACKETS] = std::array::from_fn(|p| lanes[p].1 * self.far.broadcast(p));
-        let ends = intervals(|p| lanes[p].0 + ways[p]);
-        let width = |all| widest(&merged(all, live)).as_array()[0];
-        if width(&ends) >= width(&self.origins) {
-            return self;
-        }
-        let back = intervals(|p| -ways[p]);
-        let slack = float8(4.0 * UNIT_ROUNDOFF);
-        let dirs = std::array::from_fn(|k| back[k].widened(back[k].size() * slack));
-        let origins = std::array::from_fn(|k| ends[k].widened((self.origins[k].size() + back[k].size()) * slack));
-        Bundle { origins, dirs, start: 0.0, far: Mask8::gt(self.far, Float8::ZERO).select(Float8::ONE, self.far) }
     }
 }
 
@@ -144,6 +164,18 @@ impl Interval {
         let high = greatest(live.select(self.high, float8(f32::NEG_INFINITY)));
         Interval { low: float8(low), high: float8(high) }
     }
+}
+
+fn origins(rays: &[RayPacket; PACKETS], common: Option<[f32; 3]>) -> [Interval; 3] {
+    match common {
+        Some(origin) => origin.map(|x| Interval { low: float8(x), high: float8(x) }),
+        None => intervals(|p| rays[p].origin),
+    }
+}
+
+/// By what rounding moves points that are made of coordinates of this size.
+fn widened(all: &[Interval; 3], sizes: &[Float8; 3]) -> [Interval; 3] {
+    [0, 1, 2].map(|k| all[k].widened(sizes[k] * float8(4.0 * UNIT_ROUNDOFF)))
 }
 
 fn merged(all: &[Interval; 3], live: u32) -> [Interval; 3] {

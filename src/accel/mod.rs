@@ -10,6 +10,7 @@ mod leaf;
 mod line;
 mod node;
 mod outline;
+mod regroup;
 mod stack;
 mod stream;
 #[cfg(test)]
@@ -21,6 +22,7 @@ pub use self::tile::{PACKETS, Tile};
 use glam::Vec3;
 
 use self::node::{Beam, Leaf, Node};
+use self::regroup::Regroup;
 use self::stack::Entry;
 use self::stream::Stream;
 use self::tile::Waiting;
@@ -53,6 +55,7 @@ pub struct Walk {
     /// Rays of packets that go different ways, and by packet its tile and its place there.
     apart: Stream,
     parted: Vec<(u32, u32)>,
+    regroup: Regroup,
 }
 
 /// Tests done, in pairs of a ray or packet and a box or primitive.

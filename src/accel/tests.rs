@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{PACKETS, Tree, Walk};
+use super::{PACKETS, Tile, Tree, Walk};
 use crate::fixtures::{Dice, MAKERS, cuboid, disk, exact, gray, plane, polygon, ray, scene_of, sphere, turn};
 use crate::lanes::{LANES, Ray};
 use crate::plan::Plan;
@@ -256,4 +256,36 @@ fn broken_rays_meet_nothing_in_any_company() {
         met += usize::from(alone.is_some());
     }
     assert!(met > 200, "{met}");
+}
+
+/// Shadow rays in no order, from one light, to one light, and along one direction; every tenth ray is broken.
+#[test]
+fn rays_that_are_regrouped_meet_what_they_meet_in_their_own_tiles() {
+    let mut dice = Dice(5);
+    let scene = scene_of(mixed(100, &mut dice));
+    let plan = Plan::new(&scene, DVec3::ZERO);
+    let tree = Tree::new(plan.parts(), &plan.visible);
+    let (light, mut walk) = (DVec3::new(3.0, -40.0, 25.0), Walk::default());
+    let aims: [&dyn Fn(DVec3) -> Ray; 3] = [
+        &|point| Ray { t_max: 0.999, ..ray(light, point - light) },
+        &|point| Ray { t_max: 0.999, ..ray(point, light - point) },
+        &|point| ray(point, light),
+    ];
+    for (i, aim) in aims.into_iter().enumerate() {
+        let mut rays: Vec<Ray> = (0..100 * PACKETS * LANES + 13).map(|_| aim(dice.in_cube(3.0))).collect();
+        rays.iter_mut().step_by(10).for_each(|ray| ray.dir[1] = f32::NAN);
+        let mut tiles: Vec<_> = rays.chunks(PACKETS * LANES).map(tile).collect();
+        let mut alone = tiles.clone();
+        tree.occluded_tiles(&mut tiles, &mut walk);
+        let together = std::mem::take(&mut walk.counts).boxes;
+        alone.iter_mut().for_each(|tile| tree.occluded_tiles(std::slice::from_mut(tile), &mut walk));
+        let apart = std::mem::take(&mut walk.counts).boxes;
+        let live = |tiles: &[Tile]| -> Vec<u32> {
+            tiles.iter().flat_map(|tile| tile.packets.map(|rays| rays.live().bits())).collect()
+        };
+        assert_eq!(live(&tiles), live(&alone));
+        let bright: u32 = live(&tiles).iter().map(|live| live.count_ones()).sum();
+        assert!(bright > 100 && bright < 5700, "{bright} of 5,772 rays");
+        assert!(together * 10 < apart * 9, "{i}: {together} tests of boxes against {apart}");
+    }
 }

@@ -3,6 +3,7 @@
 use super::bundle::Bundle;
 use super::leaf::{Beams, Best, PacketLeaf};
 use super::node::{Beam, Child, Content, Leaf, Node, reach};
+use super::regroup::Regroup;
 use super::stack::{Entry, Stack};
 use super::stream::Stream;
 use super::{Counts, Tree, Walk};
@@ -164,7 +165,18 @@ impl Tree {
 
     /// Finds which rays of some tiles meet anything: those lanes are dead afterwards.
     pub fn occluded_tiles(&self, tiles: &mut [Tile], walk: &mut Walk) {
-        self.walk_tiles::<true, false>(tiles, walk);
+        let mut regroup = std::mem::take(&mut walk.regroup);
+        for tiles in tiles.chunks_mut(Regroup::MOST) {
+            let is_worth_it = !self.one_by_one && self.nodes.len() > TINY;
+            match Some(tiles as &[Tile]).filter(|_| is_worth_it).and_then(|tiles| regroup.sort(tiles, self.size)) {
+                Some(sorted) => {
+                    self.walk_tiles::<true, false>(sorted, walk);
+                    regroup.hand_back(tiles);
+                }
+                None => self.walk_tiles::<true, false>(tiles, walk),
+            }
+        }
+        walk.regroup = regroup;
     }
 
     /// Packets that go the same way go together; the rays of the others are gathered from many tiles.

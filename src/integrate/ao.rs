@@ -4,8 +4,8 @@ use super::direct::{Direct, Sink};
 use super::lamps::pairs;
 use super::lights::Hits;
 use super::record::Record;
+use super::shadows::{Share, own};
 use super::wave::Wave;
-use crate::accel::PACKETS;
 use crate::lanes::{Float8, Mask8, RayPacket, Vec3x8, bits, float8};
 use crate::sample::dimension;
 use crate::shade::scattered;
@@ -34,10 +34,8 @@ impl Direct<'_> {
         light: Vec3x8,
     ) {
         let t_max = float8(self.settings.ao_distance as f32);
-        let mut lit = [0; PACKETS];
-        let mut radiance = [Vec3x8::ZERO; PACKETS];
-        sink.shadows.renew(None);
-        sink.shadows.packets.fill(RayPacket::dead());
+        let mut given = Share::new(number, hits.1);
+        let (tile, place) = sink.shadows.tile(number, None);
         for p in bits(hits.1) {
             let shaded = &hits.0[p];
             let dir = scattered(shaded.n_s, pairs(wave, p, dimension, sink.seeds));
@@ -46,12 +44,12 @@ impl Direct<'_> {
             let facing = above & Mask8::gt(shaded.bsdf.lit, zero);
             let albedo = shaded.bsdf.color * (shaded.bsdf.diffuse * shaded.softened(dir));
             let share = wave.weighted(p, albedo.scale(light));
-            (radiance[p], lit[p]) = (share, facing.bits() & shaded.hit);
-            let (origin, live) = (shaded.leave(true, shaded.error), Mask8::from_bits(lit[p]));
-            sink.shadows.packets[p] = RayPacket::new(origin, dir, t_max, live);
+            (given.radiance[p], given.lit[p]) = (share, facing.bits() & shaded.hit);
+            let (origin, live) = (shaded.leave(true, shaded.error), Mask8::from_bits(given.lit[p]));
+            tile.packets[p] = RayPacket::new(origin, dir, t_max, live);
+            tile.own[p] = own(wave.tile.hits[p], shaded.front);
         }
-        let cast = lit;
-        self.settle(number, wave, hits, (&cast, &mut lit), sink);
-        sink.add(hits.1, &radiance, &lit);
+        (given.cast, given.tile) = (given.lit, place);
+        sink.shadows.add(given);
     }
 }

@@ -10,7 +10,8 @@ use super::camera::Samples8;
 use super::hits::{Exact, Shaded};
 use super::lamps::Lamps;
 use super::record::{RayCounts, RayKind, Record};
-use super::wave::{Branch, WAVE, Wave};
+use super::shadows::Shadows;
+use super::wave::{Branch, WAVE, Wave, Whose};
 use crate::accel::{PACKETS, Tile, Tree, Walk};
 use crate::lanes::{Float8, LANES, Mask8, Vec3x8, bits, float8};
 use crate::plan::{LeftOut, Plan, Skip};
@@ -58,7 +59,10 @@ pub struct Room {
     pub seeds: Vec<Samples8>,
     /// Later rays.
     tiles: Vec<Tile>,
-    shadows: Box<Tile>,
+    /// Light that waits.
+    pub(super) shadows: Shadows,
+    /// Rays that look for lights.
+    scratch: Box<Tile>,
     shaded: Vec<Shaded>,
     exact: Vec<Exact>,
     later: Later,
@@ -69,9 +73,9 @@ pub(super) struct Sink<'a, R: Record> {
     /// Along the rays of the wave.
     pub radiance: &'a mut [Vec3x8; PACKETS],
     pub seeds: &'a [Samples8],
-    pub shadows: &'a mut Tile,
+    pub shadows: &'a mut Shadows,
+    pub scratch: &'a mut Tile,
     pub walk: &'a mut Walk,
-    pub rays: &'a mut RayCounts,
     pub left_out: &'a mut LeftOut,
     pub record: &'a mut R,
 }
@@ -86,7 +90,8 @@ impl Default for Room {
             samples: Samples::default(),
             seeds: Vec::new(),
             tiles: Vec::new(),
-            shadows: Box::new(Tile::empty()),
+            shadows: Shadows::default(),
+            scratch: Box::new(Tile::empty()),
             shaded: vec![Shaded::NOTHING; PACKETS],
             exact: Vec::new(),
             later: Later::default(),
@@ -148,7 +153,7 @@ impl<'s> Direct<'s> {
 
     /// Traces the camera rays of the wave, which where [`Direct::goes_on`] keep what they were before they were
     /// rounded; without `sees` it is known that they meet no primitive. What goes on from them waits for
-    /// [`Direct::trace_later`].
+    /// [`Direct::finish`].
     pub fn trace_camera<R: Record>(&self, sees: bool, room: &mut Room, record: &mut R) {
         let (kind, count) = (RayKind::Camera as usize, room.wave.count());
         if sees {
@@ -177,9 +182,17 @@ impl<'s> Direct<'s> {
         }
     }
 
+    /// Traces all that still waits since [`Room::begin`]: then the samples are complete.
+    pub fn finish<R: Record>(&self, room: &mut Room, record: &mut R) {
+        if self.goes_on() {
+            self.trace_later(room, record);
+        }
+        self.settle(room, record);
+    }
+
     /// Traces what goes on from the camera rays since [`Room::begin`], depth by depth, so that few of the tiles are
     /// not full. All rays of a sample keep their order, whatever other samples are there: so sums do as well.
-    pub fn trace_later<R: Record>(&self, room: &mut Room, record: &mut R) {
+    fn trace_later<R: Record>(&self, room: &mut Room, record: &mut R) {
         for depth in 2..=self.settings.max_depth {
             let later = std::mem::take(&mut room.later);
             let kinds = [RayKind::Reflection, RayKind::Refraction, RayKind::Bounce];
@@ -213,7 +226,7 @@ impl<'s> Direct<'s> {
 
     /// Shades what the rays of the wave met.
     fn light<R: Record>(&self, room: &mut Room, record: &mut R) {
-        let Room { walk, rays, left_out, wave, samples, seeds, shadows, shaded, exact, later, .. } = room;
+        let Room { walk, rays, left_out, wave, samples, seeds, shadows, scratch, shaded, exact, later, .. } = room;
         let kind = wave.kind as usize;
         let live: [u32; PACKETS] = std::array::from_fn(|p| wave.tile.packets[p].live().bits());
         let wave = &**wave;
@@ -221,9 +234,9 @@ impl<'s> Direct<'s> {
         let mut seen = 0;
         exact.clear();
         let taken = {
-            let (shadows, walk, rays) = (&mut **shadows, &mut *walk, &mut *rays);
+            let (shadows, scratch, walk) = (&mut *shadows, &mut **scratch, &mut *walk);
             let (left_out, record) = (&mut *left_out, &mut *record);
-            let sink = &mut Sink { radiance: &mut radiance, seeds, shadows, walk, rays, left_out, record };
+            let sink = &mut Sink { radiance: &mut radiance, seeds, shadows, scratch, walk, left_out, record };
             self.meet_lamps(wave, &live, sink)
         };
         for (p, live) in live.into_iter().enumerate().filter(|(_, live)| *live != 0) {
@@ -241,7 +254,7 @@ impl<'s> Direct<'s> {
                 self.add_ambient(wave, &shaded[p], &mut radiance[p]);
             }
         }
-        let sink = &mut Sink { radiance: &mut radiance, seeds, shadows, walk, rays, left_out, record };
+        let sink = &mut Sink { radiance: &mut radiance, seeds, shadows, scratch, walk, left_out, record };
         match self.settings.integrator {
             Integrator::Ao => self.add_openness(wave, (shaded, seen), sink),
             Integrator::Direct | Integrator::Path => {
@@ -258,7 +271,8 @@ impl<'s> Direct<'s> {
                 Integrator::Direct | Integrator::Ao => self.branches(wave, shaded, exact, later),
             }
         }
-        samples.add(wave, &live, &radiance);
+        shadows.end_wave(wave, live, radiance);
+        self.settle_many(room, record);
     }
 
     fn tell<R: Record>(&self, wave: &Wave, p: usize, live: u32, record: &mut R) {
@@ -277,7 +291,7 @@ impl<'s> Direct<'s> {
         if camera {
             let opaque = if transparent { !miss } else { !0 };
             let alpha = Mask8::from_bits(opaque & 0xff).select(float8(1.0), Float8::ZERO);
-            samples.alpha[wave.first / LANES + p] = alpha;
+            samples.alpha[wave.slot(p, 0) / LANES] = alpha;
         }
         if miss != 0 && !transparent {
             let mut seen = self.backdrop.radiance(wave.tile.packets[p].dir, miss);
@@ -302,16 +316,16 @@ impl<'s> Direct<'s> {
 
 impl Samples {
     /// Adds what was found along the rays of a wave; camera rays are the first of their samples.
-    fn add(&mut self, wave: &Wave, live: &[u32; PACKETS], radiance: &[Vec3x8; PACKETS]) {
-        if wave.kind == RayKind::Camera {
-            let first = wave.first / LANES;
+    pub(super) fn add(&mut self, whose: &Whose, live: &[u32; PACKETS], radiance: &[Vec3x8; PACKETS]) {
+        if let Some(first) = whose.first {
+            let first = first / LANES;
             self.radiance[first..first + PACKETS].copy_from_slice(radiance);
             return;
         }
         for (p, live) in live.iter().enumerate().filter(|(_, live)| **live != 0) {
             let values = radiance[p].to_arrays();
             for i in bits(*live) {
-                let slot = wave.slot(p, i);
+                let slot = whose.slot(p, i);
                 let sums = &mut self.radiance[slot / LANES];
                 sums.x.as_mut_array()[slot % LANES] += values[i][0];
                 sums.y.as_mut_array()[slot % LANES] += values[i][1];

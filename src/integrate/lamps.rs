@@ -9,6 +9,7 @@ use super::direct::{Direct, Sink};
 use super::hits::Shaded;
 use super::lights::Hits;
 use super::record::{RayKind, Record};
+use super::shadows::{Share, own};
 use super::wave::Wave;
 use crate::accel::{PACKETS, Tree};
 use crate::lanes::{Float8, LANES, Mask8, RayPacket, UNIT_ROUNDOFF, Vec3x8, bits, float8};
@@ -121,10 +122,8 @@ impl Direct<'_> {
         // What scattered rays may meet as well is weighed.
         let weighed = self.is_path() && shadows && wave.depth < self.settings.max_depth;
         let skip = self.plan.skips.allows(Skip::Shadows);
-        let (mut lit, mut cast) = ([0; PACKETS], [0; PACKETS]);
-        let mut radiance = [Vec3x8::ZERO; PACKETS];
-        sink.shadows.renew(None);
-        sink.shadows.packets.fill(RayPacket::dead());
+        let mut given = Share::new(index, hits.1);
+        let mut tile = shadows.then(|| sink.shadows.tile(index, None));
         for p in bits(hits.1) {
             let shaded = &hits.0[p];
             let drawn = draw(shaded.point, pairs(wave, p, dimension::LIGHTS + index as u32, sink.seeds));
@@ -132,22 +131,18 @@ impl Direct<'_> {
             let (share, facing) = shaded.weighed_share(drawn.wi, drawn.strength, diffuse);
             let share = wave.weighted(p, share);
             let facing = if skip { facing & Mask8::gt(share.sum(), Float8::ZERO) } else { facing };
-            (radiance[p], lit[p]) = (share, facing.bits() & shaded.hit);
-            if shadows {
+            (given.radiance[p], given.lit[p]) = (share, facing.bits() & shaded.hit);
+            if let Some((tile, place)) = &mut tile {
                 // All but those in the light itself, where there is no way to go.
-                cast[p] = if skip { lit[p] } else { Mask8::le(drawn.wi.x, drawn.wi.x).bits() & shaded.hit };
-                sink.left_out[Skip::Shadows] += u64::from((shaded.hit & !cast[p]).count_ones());
-                sink.shadows.packets[p] = shaded.rays_to(&drawn, Mask8::from_bits(cast[p]));
+                let all = || Mask8::le(drawn.wi.x, drawn.wi.x).bits() & shaded.hit;
+                given.cast[p] = if skip { given.lit[p] } else { all() };
+                sink.left_out[Skip::Shadows] += u64::from((shaded.hit & !given.cast[p]).count_ones());
+                tile.packets[p] = shaded.rays_to(&drawn, Mask8::from_bits(given.cast[p]));
+                tile.own[p] = own(wave.tile.hits[p], shaded.front);
+                given.tile = *place;
             }
         }
-        if shadows {
-            self.settle(index, wave, hits, (&cast, &mut lit), sink);
-        } else if R::ON {
-            for (p, lit) in lit.into_iter().enumerate() {
-                bits(lit).for_each(|i| sink.record.lit(index, wave.slot(p, i), wave.path(p, i)));
-            }
-        }
-        sink.add(hits.1, &radiance, &lit);
+        sink.shadows.add(given);
     }
 
     /// Adds the lights that rays meet before they meet anything else, and tells whose rays end there.
@@ -175,16 +170,16 @@ impl Direct<'_> {
         sink: &mut Sink<R>,
     ) -> [u32; PACKETS] {
         let mut taken = [0; PACKETS];
-        sink.shadows.renew(wave.tile.common);
+        sink.scratch.renew(wave.tile.common);
         for (p, rays) in wave.tile.packets.iter().enumerate() {
             let t_max = rays.t_max * float8(1.0 + NEARER);
-            sink.shadows.packets[p] = RayPacket::new(rays.origin, rays.dir, t_max, Mask8::from_bits(live[p]));
+            sink.scratch.packets[p] = RayPacket::new(rays.origin, rays.dir, t_max, Mask8::from_bits(live[p]));
         }
-        tree.closest_tiles(from_mut(sink.shadows), sink.walk);
+        tree.closest_tiles(from_mut(sink.scratch), sink.walk);
         for p in (0..PACKETS).filter(|p| live[*p] != 0) {
             let mut radiance = [[0.0; 3]; LANES];
             for i in bits(live[p]) {
-                let row = sink.shadows.hit(p, i);
+                let row = sink.scratch.hit(p, i);
                 let Some(kind) = row.kind() else { continue };
                 let place = places[tree.stores().owner(kind, row.row()).primitive as usize];
                 let area = &self.lamps.areas[place];
@@ -207,20 +202,20 @@ impl Direct<'_> {
         let mut left = *live;
         let mut from = [Float8::ZERO; PACKETS];
         while left.iter().any(|left| *left != 0) {
-            sink.shadows.renew(None);
+            sink.scratch.renew(None);
             for (p, rays) in wave.tile.packets.iter().enumerate() {
                 let open = Mask8::from_bits(left[p]);
                 let (dead_from, dead_to) = (float8(f32::INFINITY), float8(f32::NEG_INFINITY));
                 let (t_min, t_max) = (open.select(from[p], dead_from), rays.t_max * float8(1.0 + NEARER));
                 let packet = RayPacket::within(rays.origin, rays.dir, t_min, open.select(t_max, dead_to));
-                sink.shadows.packets[p] = packet;
+                sink.scratch.packets[p] = packet;
             }
-            tree.closest_tiles(from_mut(sink.shadows), sink.walk);
+            tree.closest_tiles(from_mut(sink.scratch), sink.walk);
             for p in 0..PACKETS {
-                let t = sink.shadows.packets[p].t_max;
+                let t = sink.scratch.packets[p].t_max;
                 let mut met = 0;
                 for i in bits(left[p]) {
-                    let row = sink.shadows.hit(p, i);
+                    let row = sink.scratch.hit(p, i);
                     let Some(kind) = row.kind() else { continue };
                     // The same place again: f64 found it a rounding further on.
                     if t.as_array()[i] <= from[p].as_array()[i] {
@@ -244,16 +239,6 @@ impl Direct<'_> {
         let wide = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
         let other = self.lamps.areas[place].density(wide(ray.origin), wide(ray.dir) * f64::from(t));
         share(f64::from(wave.density[p].as_array()[i]), other) as f32
-    }
-}
-
-impl<R: Record> Sink<'_, R> {
-    /// Adds radiance to the lanes of some packets.
-    pub(super) fn add(&mut self, packets: u32, radiance: &[Vec3x8; PACKETS], lanes: &[u32; PACKETS]) {
-        for p in bits(packets) {
-            let sum = self.radiance[p] + radiance[p];
-            self.radiance[p] = Vec3x8::select(Mask8::from_bits(lanes[p]), sum, self.radiance[p]);
-        }
     }
 }
 

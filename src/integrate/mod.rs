@@ -9,6 +9,7 @@ mod lamps;
 mod lights;
 mod path;
 mod record;
+mod shadows;
 mod wave;
 
 pub use self::camera::{CameraRays, PixelPattern, Samples8};

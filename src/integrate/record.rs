@@ -101,7 +101,7 @@ pub trait Record {
     fn passes_blanks(&self) -> bool {
         !Self::ON && !Self::SURFACES
     }
-    /// Whether what each tile costs is to be told.
+    /// Whether what each tile costs is to be told, for which shadow rays do not wait for those of others.
     fn counts_tiles(&self) -> bool {
         false
     }

@@ -18,18 +18,25 @@ pub struct Wave {
     pub kind: RayKind,
     /// The camera ray is 1.
     pub depth: u32,
-    /// The sample of the first ray, where ray k belongs to sample `first + k`: camera rays.
-    pub first: usize,
-    /// The sample of each of the others.
-    slots: [[u32; LANES]; PACKETS],
+    /// Whose rays they are.
+    pub(super) whose: Whose,
     /// Share of each ray's radiance, but for camera rays, of which all counts.
     weight: [Vec3x8; PACKETS],
-    /// How each ray came about, but for camera rays.
-    paths: [[u32; LANES]; PACKETS],
     /// With which each ray was drawn, per steradian, where they are scattered.
     pub(super) density: [Float8; PACKETS],
     /// The rays before they were rounded, where rays go on from what they meet.
     pub exact: [ExactPacket; PACKETS],
+}
+
+/// The samples that rays belong to, and how they came about.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Whose {
+    /// The sample of the first ray, where ray k belongs to sample `first + k`: camera rays.
+    pub first: Option<usize>,
+    /// The sample of each of the others.
+    slots: [[u32; LANES]; PACKETS],
+    /// How each of them came about.
+    paths: [[u32; LANES]; PACKETS],
 }
 
 /// A ray to be traced later.
@@ -68,10 +75,8 @@ impl Wave {
             tile: Tile::empty(),
             kind: RayKind::Camera,
             depth: 1,
-            first: 0,
-            slots: [[0; LANES]; PACKETS],
+            whose: Whose { first: Some(0), slots: [[0; LANES]; PACKETS], paths: [[0; LANES]; PACKETS] },
             weight: [Vec3x8::ZERO; PACKETS],
-            paths: [[0; LANES]; PACKETS],
             density: [Float8::ZERO; PACKETS],
             exact: [ExactPacket::default(); PACKETS],
         }
@@ -79,20 +84,20 @@ impl Wave {
 
     /// Takes it for camera rays, whose packets are still to be set.
     pub fn begin(&mut self, first: usize, common: Option<[f32; 3]>) {
-        (self.kind, self.depth, self.first) = (RayKind::Camera, 1, first);
+        (self.kind, self.depth, self.whose.first) = (RayKind::Camera, 1, Some(first));
         self.tile.renew(common);
     }
 
     /// Takes it for up to 64 later rays, which have been traced.
     pub(super) fn fill(&mut self, tile: &mut Tile, branches: &[Branch], kind: RayKind, depth: u32) {
-        (self.kind, self.depth) = (kind, depth);
+        (self.kind, self.depth, self.whose.first) = (kind, depth, None);
         std::mem::swap(&mut self.tile, tile);
         for (p, branches) in branches.chunks(LANES).enumerate() {
             let lane = |i: usize| &branches[i.min(branches.len() - 1)];
             self.weight[p] = Vec3x8::from_fn(|i| lane(i).weight);
             self.density[p] = Float8::from(std::array::from_fn::<f32, LANES, _>(|i| lane(i).density));
             for (i, branch) in branches.iter().enumerate() {
-                (self.slots[p][i], self.paths[p][i]) = (branch.slot, branch.path);
+                (self.whose.slots[p][i], self.whose.paths[p][i]) = (branch.slot, branch.path);
                 self.exact[p].set_lane(i, branch.exact.0, branch.exact.1);
             }
         }
@@ -117,21 +122,32 @@ impl Wave {
     /// The sample of a ray.
     #[inline(always)]
     pub(super) fn slot(&self, p: usize, lane: usize) -> usize {
-        match self.kind {
-            RayKind::Camera => self.first + p * LANES + lane,
-            _ => self.slots[p][lane] as usize,
-        }
+        self.whose.slot(p, lane)
     }
 
     /// How a ray came about.
     #[inline(always)]
     pub(super) fn path(&self, p: usize, lane: usize) -> u32 {
-        if self.kind == RayKind::Camera { 1 } else { self.paths[p][lane] }
+        self.whose.path(p, lane)
     }
 
     /// The bits of a ray as they were traced.
     pub(super) fn ray(&self, p: usize, lane: usize, t_max: f32) -> Ray {
         let rays = &self.tile.packets[p];
         Ray { origin: rays.origin.lane(lane), t_min: 0.0, dir: rays.dir.lane(lane), t_max }
+    }
+}
+
+impl Whose {
+    /// The sample of a ray.
+    #[inline(always)]
+    pub fn slot(&self, p: usize, lane: usize) -> usize {
+        self.first.map_or_else(|| self.slots[p][lane] as usize, |first| first + p * LANES + lane)
+    }
+
+    /// How a ray came about.
+    #[inline(always)]
+    pub fn path(&self, p: usize, lane: usize) -> u32 {
+        if self.first.is_some() { 1 } else { self.paths[p][lane] }
     }
 }

@@ -79,12 +79,19 @@ impl RayPacket {
         Ray { origin: self.origin.lane(i), t_min, dir: self.dir.lane(i), t_max }
     }
 
-    /// Origins and directions, those of a live ray in dead lanes.
-    pub fn filled(&self) -> (Vec3x8, Vec3x8) {
+    /// The same with a copy of a live ray in dead lanes.
+    #[inline(always)]
+    pub fn filled(&self) -> Self {
         let live = self.live();
         let one = live.bits().trailing_zeros() as usize % LANES;
-        let fill = |lanes: Vec3x8| Vec3x8::select(live, lanes, lanes.broadcast(one));
-        (fill(self.origin), fill(self.dir))
+        let fill = |lanes: Float8| live.select(lanes, lanes.broadcast(one));
+        RayPacket {
+            origin: Vec3x8::select(live, self.origin, self.origin.broadcast(one)),
+            dir: Vec3x8::select(live, self.dir, self.dir.broadcast(one)),
+            t_min: fill(self.t_min),
+            t_max: fill(self.t_max),
+            inv_dd: fill(self.inv_dd),
+        }
     }
 
     /// Lanes in which a hit at `t` lies on the ray.

@@ -56,8 +56,8 @@ impl BlockWork {
     }
 }
 
-/// Camera tiles that are traced before what goes on from them, so that the tiles of that are full.
-const BATCH: usize = 32;
+/// Camera tiles that are traced before all that goes on from them, so that the tiles of that are full.
+const BATCH: usize = 64;
 
 impl Block {
     pub fn new(window: Window) -> Self {
@@ -305,7 +305,7 @@ impl<R: Record> Work<'_, '_, R> {
         self.background_tiles += u64::from(self.room.rays.hits[RayKind::Camera as usize] == met);
         batch.traced += batch.count;
         batch.count = 0;
-        if !self.direct.goes_on() || batch.traced == BATCH * WAVE {
+        if batch.traced == BATCH * WAVE {
             self.finish(batch);
         }
     }
@@ -322,9 +322,7 @@ impl<R: Record> Work<'_, '_, R> {
 
     /// Traces what goes on and adds the samples to their pixels.
     fn finish(&mut self, batch: &mut Batch) {
-        if self.direct.goes_on() {
-            self.direct.trace_later(&mut self.room, self.record);
-        }
+        self.direct.finish(&mut self.room, self.record);
         batch.add_to(&self.room.samples, self.sums);
         if R::SURFACES {
             let (count, pixels, samples) = (batch.traced, &batch.pixels[..], &self.room.samples);

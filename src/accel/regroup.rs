@@ -1,0 +1,285 @@
+//! Rays of many tiles that ask for any hit, put into new tiles with those that are close to them.
+//!
+//! What neighbouring pixels see may lie far apart in depth, and so do the rays between there and a light: tiles of
+//! them are wide, and overlap. Sorted along a Z curve the same rays fill tiles that are narrow.
+
+use super::tile::{PACKETS, Tile};
+use crate::lanes::{Float8, LANES, Mask8, RayPacket, Vec3x8, bits, float8, greatest, least};
+
+/// Rays of a tile.
+const TILE: usize = PACKETS * LANES;
+/// Rays are sorted into a square of cells, so many along an edge.
+const EDGE: usize = 64;
+/// Tiles that overlap so many times on average are taken apart.
+const OVERLAP: f32 = 4.0;
+/// The cell of dead rays.
+const DEAD: usize = EDGE * EDGE;
+/// Fewer tiles are not worth it.
+const FEWEST: usize = 4;
+
+/// Room for the rays of some tiles in another order.
+#[derive(Debug, Default)]
+pub struct Regroup {
+    /// Unit directions.
+    dirs: Points,
+    /// Where the lines that the rays are on pass zero, lengths of the scene.
+    feet: Points,
+    /// By ray its cell along a Z curve, [`DEAD`] where it is dead.
+    cells: Vec<u16>,
+    /// By cell the next place in the order.
+    places: Vec<u16>,
+    /// By place the number of the ray, live ones first.
+    order: Vec<u16>,
+    /// By ray its origin, end, direction and the row it begins or ends on.
+    lines: Vec<Float8>,
+    tiles: Vec<Tile>,
+}
+
+/// Points that stand for rays, and how they spread.
+#[derive(Debug, Default)]
+struct Points {
+    /// By packet.
+    points: Vec<Vec3x8>,
+    /// The least coordinates of live rays, and how far all of them and those of each tile spread.
+    low: [f32; 3],
+    extent: [f32; 3],
+    extents: Vec<[f32; 3]>,
+}
+
+impl Regroup {
+    /// Most tiles at a time.
+    pub const MOST: usize = 64;
+
+    /// The rays in other tiles, where that is worth it in a scene of this size; dead ones are left out.
+    pub fn sort(&mut self, tiles: &[Tile], size: f32) -> Option<&mut [Tile]> {
+        if tiles.len() < FEWEST || !tiles.iter().all(is_plain) {
+            return None;
+        }
+        let common = tiles[0].common.filter(|_| tiles.iter().all(|tile| tile.common == tiles[0].common));
+        self.dirs.take(tiles, |rays| rays.dir * rays.inv_dd.sqrt());
+        let mut points = &self.dirs;
+        if common.is_none() {
+            let unit = |rays: &RayPacket| rays.dir * rays.inv_dd.sqrt();
+            let foot = |rays: &RayPacket| unit(rays).mul_add(-rays.origin.dot(unit(rays)), rays.origin);
+            self.feet.take(tiles, |rays| foot(rays) * float8(1.0 / size));
+            if self.feet.widest() > self.dirs.widest() {
+                points = &self.feet;
+            }
+        }
+        if !points.overlap() {
+            return None;
+        }
+        points.find_cells(tiles, &mut self.cells);
+        self.order_cells();
+        self.fill(tiles, common);
+        Some(&mut self.tiles)
+    }
+
+    /// Lets the rays die that did so in the other tiles.
+    pub fn hand_back(&self, tiles: &mut [Tile]) {
+        for (p, order) in self.order.chunks(LANES).enumerate() {
+            let live = self.tiles[p / PACKETS].packets[p % PACKETS].live().bits();
+            for i in bits(!live & ((1 << order.len()) - 1)) {
+                let (tile, p, lane) = place(order[i]);
+                tiles[tile].packets[p].t_min.as_mut_array()[lane] = f32::INFINITY;
+            }
+        }
+    }
+
+    /// Orders rays by their cells; those of one cell keep their order.
+    fn order_cells(&mut self) {
+        let Regroup { cells, places, order, .. } = self;
+        places.clear();
+        places.resize(DEAD + 1, 0);
+        cells.iter().for_each(|cell| places[usize::from(*cell)] += 1);
+        let mut next = 0;
+        for place in &mut *places {
+            (*place, next) = (next, next + *place);
+        }
+        let live = usize::from(places[DEAD]);
+        order.resize(cells.len(), 0);
+        for (ray, cell) in cells.iter().enumerate() {
+            let place = &mut places[usize::from(*cell)];
+            order[usize::from(*place)] = ray as u16;
+            *place += 1;
+        }
+        order.truncate(live);
+    }
+
+    /// Puts the rays into tiles in their order.
+    fn fill(&mut self, from: &[Tile], common: Option<[f32; 3]>) {
+        let Regroup { order, lines, tiles, .. } = self;
+        lines.clear();
+        for tile in from {
+            for (rays, own) in tile.packets.iter().zip(&tile.own) {
+                let (RayPacket { origin, dir, t_max, .. }, own) = (rays, *own);
+                let columns = [origin.x, origin.y, origin.z, *t_max, dir.x, dir.y, dir.z, own];
+                lines.extend(Float8::transpose(columns));
+            }
+        }
+        tiles.resize_with(order.len().div_ceil(TILE), Tile::empty);
+        for (tile, order) in tiles.iter_mut().zip(order.chunks(TILE)) {
+            tile.renew(common);
+            tile.packets[order.len().div_ceil(LANES)..].fill(RayPacket::dead());
+            for (p, order) in order.chunks(LANES).enumerate() {
+                let line = |i: usize| lines[usize::from(order[i.min(order.len() - 1)])];
+                let [ox, oy, oz, t_max, dx, dy, dz, own] = Float8::transpose(std::array::from_fn(line));
+                let (origin, dir) = (Vec3x8::new(ox, oy, oz), Vec3x8::new(dx, dy, dz));
+                let live = Mask8::from_bits((1 << order.len()) - 1);
+                (tile.packets[p], tile.own[p]) = (RayPacket::new(origin, dir, t_max, live), own);
+            }
+        }
+    }
+}
+
+impl Points {
+    fn take(&mut self, tiles: &[Tile], of: impl Fn(&RayPacket) -> Vec3x8) {
+        self.points.clear();
+        self.extents.clear();
+        let (mut all_low, mut all_high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        let (first, last) = (Vec3x8::constant(f32::INFINITY), Vec3x8::constant(f32::NEG_INFINITY));
+        for tile in tiles {
+            let (mut low, mut high) = (first, last);
+            for rays in &tile.packets {
+                let (point, live) = (of(rays), rays.live());
+                self.points.push(point);
+                low = low.min(Vec3x8::select(live, point, first));
+                high = high.max(Vec3x8::select(live, point, last));
+            }
+            let (low, high) = ([low.x, low.y, low.z].map(least), [high.x, high.y, high.z].map(greatest));
+            self.extents.push(std::array::from_fn(|k| (high[k] - low[k]).max(0.0)));
+            all_low = std::array::from_fn(|k| all_low[k].min(low[k]));
+            all_high = std::array::from_fn(|k| all_high[k].max(high[k]));
+        }
+        (self.low, self.extent) = (all_low, std::array::from_fn(|k| all_high[k] - all_low[k]));
+    }
+
+    fn widest(&self) -> f32 {
+        self.extent.into_iter().fold(0.0, f32::max)
+    }
+
+    /// The two axes on which they spread most.
+    fn axes(&self) -> [usize; 2] {
+        let [x, y, z] = self.extent;
+        if x < y.min(z) {
+            [1, 2]
+        } else if y < z {
+            [0, 2]
+        } else {
+            [0, 1]
+        }
+    }
+
+    /// Whether the tiles overlap on these axes so often that other ones would be much narrower.
+    fn overlap(&self) -> bool {
+        let [a, b] = self.axes();
+        let area = |extent: &[f32; 3]| extent[a] * extent[b];
+        self.extents.iter().map(area).sum::<f32>() >= OVERLAP * area(&self.extent)
+    }
+
+    /// The cells of all rays along a Z curve.
+    fn find_cells(&self, tiles: &[Tile], cells: &mut Vec<u16>) {
+        let axes = self.axes();
+        let scale = axes.map(|k| (EDGE - 1) as f32 / self.extent[k]);
+        cells.clear();
+        let packets = tiles.iter().flat_map(|tile| &tile.packets);
+        for (rays, point) in packets.zip(&self.points) {
+            let columns = [point.x, point.y, point.z];
+            let at = |i: usize| (columns[axes[i]] - float8(self.low[axes[i]])) * float8(scale[i]) + float8(INTEGERS);
+            let (a, b, live) = (at(0).to_array(), at(1).to_array(), rays.live().bits());
+            let number = |x: f32| x.to_bits() as usize % EDGE;
+            let mut eight = [DEAD as u16; LANES];
+            for (i, cell) in eight.iter_mut().enumerate() {
+                let z = SPREAD[number(a[i])] | SPREAD[number(b[i])] << 1;
+                *cell = if live >> i & 1 == 1 { z } else { *cell };
+            }
+            cells.extend_from_slice(&eight);
+        }
+    }
+}
+
+/// From here on floats are the integers, which their last bits count.
+const INTEGERS: f32 = 8_388_608.0;
+
+/// The bits of numbers on every second place.
+const SPREAD: [u16; EDGE] = {
+    let (mut table, mut i) = ([0; EDGE], 0);
+    while i < EDGE {
+        let mut bit = 0;
+        while bit < 8 {
+            table[i] |= ((i >> bit & 1) << (2 * bit)) as u16;
+            bit += 1;
+        }
+        i += 1;
+    }
+    table
+};
+
+/// Tile, packet and lane of a ray, by its number.
+#[inline(always)]
+fn place(ray: u16) -> (usize, usize, usize) {
+    let ray = usize::from(ray);
+    (ray / TILE, ray / LANES % PACKETS, ray % LANES)
+}
+
+/// Whether the rays begin at their origins, and are what their bits are.
+fn is_plain(tile: &Tile) -> bool {
+    let begins = |rays: &RayPacket| (Mask8::same_bits(rays.t_min, Float8::ZERO) | !rays.live()).all();
+    tile.exact.is_none() && tile.packets.iter().all(begins)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Directions on a square grid, in tiles of 8 x 8, or so that every tile spreads over all of it.
+    fn tiles(scattered: bool) -> Vec<Tile> {
+        let packet = |tile: usize, p: usize| {
+            let at = |i: usize| match scattered {
+                true => [p * 8 + tile / 8, i * 8 + tile % 8],
+                false => [tile / 8 * 8 + p, tile % 8 * 8 + i],
+            };
+            let dir = Vec3x8::from_fn(|i| [at(i)[0] as f32, at(i)[1] as f32, 100.0]);
+            RayPacket::new(Vec3x8::ZERO, dir, float8(1.0), Mask8::from_bits(0xff))
+        };
+        (0..64).map(|tile| Tile::new(std::array::from_fn(|p| packet(tile, p)), Some([0.0; 3]))).collect()
+    }
+
+    #[test]
+    fn tiles_that_lie_side_by_side_stay_as_they_are() {
+        assert!(Regroup::default().sort(&tiles(false), 1.0).is_none());
+    }
+
+    #[test]
+    fn tiles_that_overlap_are_parted() {
+        let (mut regroup, mut from) = (Regroup::default(), tiles(true));
+        from[3].packets[2].t_min = float8(f32::INFINITY);
+        let sorted = regroup.sort(&from, 1.0).expect("tiles that overlap");
+        let live = |tiles: &[Tile]| -> Vec<[u32; 3]> {
+            let rays = tiles.iter().flat_map(|tile| tile.packets);
+            let dirs = rays.flat_map(|rays| rays.live().lanes().map(|i| rays.dir.lane(i)).collect::<Vec<_>>());
+            dirs.map(|dir| dir.map(f32::to_bits)).collect()
+        };
+        let (mut before, mut after) = (live(&from), live(sorted));
+        assert_eq!(after.len(), 64 * 64 - 8);
+        before.sort_unstable();
+        after.sort_unstable();
+        assert_eq!(before, after);
+        let mut points = Points::default();
+        points.take(sorted, |rays| rays.dir);
+        assert!(!points.overlap());
+    }
+
+    #[test]
+    fn what_dies_in_new_tiles_dies_in_the_old_ones() {
+        let (mut regroup, mut from) = (Regroup::default(), tiles(true));
+        let sorted = regroup.sort(&from, 1.0).expect("tiles that overlap");
+        let dead = sorted[7].packets[5].dir.lane(3);
+        sorted[7].packets[5].t_min.as_mut_array()[3] = f32::INFINITY;
+        regroup.hand_back(&mut from);
+        let packets = from.iter().flat_map(|tile| &tile.packets);
+        let gone: Vec<_> =
+            packets.flat_map(|rays| (!rays.live()).lanes().map(|i| rays.dir.lane(i)).collect::<Vec<_>>()).collect();
+        assert_eq!(gone, [dead]);
+    }
+}
