@@ -294,6 +294,7 @@ def main(room):
     # A foreground over a background is the render with that background.
     foreground_over_background(room)
     foreign_files(room)
+    every_scene(room)
 
 
 def foreground_over_background(room):
@@ -315,6 +316,22 @@ def foreground_over_background(room):
     got, want = (image.get_pixels(roi=oiio.ROI(0, 160, 0, 120))[:, :, :3] for image in (over, whole))
     check(numpy.abs(got - want).max() < 2e-6, f"over: {numpy.abs(got - want).max()}")
     check((front.spec().width, front.spec().height) != (0, 0), "front")
+
+
+def every_scene(room):
+    """All layers of every scene that is shipped: nothing that spreads, and nothing negative where that has no meaning."""
+    scenes = [*(ROOT / "scenes").glob("*.toml"), *(ROOT / "scenes/nff").glob("*.nff*")]
+    scenes += [path for path in (ROOT / "scenes/particles").iterdir() if path.is_file() and path.suffix != ".md"]
+    check(len(scenes) > 50, f"{len(scenes)} scenes")
+    for scene in sorted(scenes):
+        octray("render", scene, "-q", "--resolution", "80x60", "--spp", "4", "--aov", "all,margin,cost", "-o", room / "scene.exr")
+        _, channels = layers(room / "scene.exr")
+        check(len(channels) > 60, f"{scene}: {len(channels)} channels")
+        for name, pixels in channels.items():
+            is_id = name.startswith("crypto") and name[-1] in "RB"
+            signed = is_id or name.split(".")[0] in ("P", "N", "uv", "forward", "margin")
+            check(pixels.dtype.kind == "u" or numpy.isfinite(pixels).all(), f"{scene}: {name} is finite")
+            check(signed or (pixels >= 0).all(), f"{scene}: {name} is not negative")
 
 
 def foreign_files(room):

@@ -33,6 +33,8 @@ impl Objects {
     #[inline]
     pub fn of(&self, primitive: u32) -> u32 {
         match primitive.checked_sub(self.singles) {
+            // A single cloud need not be looked for.
+            Some(_) if !self.instances && self.starts.len() == 2 => self.singles,
             Some(_) if !self.instances => self.singles + self.cloud(primitive),
             _ => primitive,
         }

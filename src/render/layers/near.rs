@@ -1,5 +1,6 @@
 //! What a pixel keeps: the sample nearest to its centre, and batches of samples for the variance of its mean.
 
+use super::sums::Places;
 use crate::lanes::LANES;
 use crate::scene::{Aov, Layers};
 use crate::shapes::RowRef;
@@ -94,7 +95,6 @@ impl Nearest {
     }
 
     /// What a sample sees that was chosen; `object` gives the number of the object that a primitive belongs to.
-    #[inline]
     pub fn see(&mut self, pixel: usize, near: Near, depth: f32, object: impl FnOnce(u32) -> u32) {
         set(&mut self.depth, pixel, depth);
         if let Some(number) = self.objects.get_mut(pixel) {
@@ -102,6 +102,21 @@ impl Nearest {
         }
         set(&mut self.materials, pixel, near.material + 1);
         set(&mut self.near, pixel, near);
+    }
+
+    /// The same for some samples of a packet, layer by layer.
+    #[inline]
+    pub fn see8(&mut self, places: &Places, near: &[Near; LANES], depth: &[f32; LANES], object: impl Fn(u32) -> u32) {
+        if !self.depth.is_empty() {
+            places.set(&mut self.depth, depth);
+        }
+        if !self.objects.is_empty() {
+            places.set(&mut self.objects, &near.map(|near| object(near.primitive).wrapping_add(1)));
+            places.set(&mut self.materials, &near.map(|near| near.material.wrapping_add(1)));
+        }
+        if !self.near.is_empty() {
+            places.set(&mut self.near, near);
+        }
     }
 }
 

@@ -116,7 +116,7 @@ impl Places<'_> {
     }
 
     #[inline]
-    fn set<T: Copy>(&self, column: &mut [T], values: &[T; LANES]) {
+    pub fn set<T: Copy>(&self, column: &mut [T], values: &[T; LANES]) {
         if self.lanes == (1 << LANES) - 1 {
             self.pixels.iter().zip(values).for_each(|(pixel, value)| column[*pixel as usize] = *value);
         } else {

@@ -97,16 +97,21 @@ impl<'a, 's> LayerTape<'a, 's> {
         let (t, dir) = (seen.rays.t_max, seen.rays.dir);
         let share = self.axis.map_or_else(|| dir.length(), |axis| dir.dot(Vec3x8::splat(axis)));
         let (depth, t, rows) = ((t * share).to_array(), t.to_array(), seen.rows.to_array());
+        // Lanes that met nothing may hold anything: they are passed over.
+        let near = std::array::from_fn(|i| Near {
+            t: t[i],
+            row: RowRef::from_lane(rows[i]),
+            primitive: seen.owners[i].primitive,
+            material: seen.materials[i],
+            sample: packet.index[i],
+        });
+        let places = Places { pixels: &packet.pixels, lanes: nearest, whole: false };
         let (plan, all) = (self.plan, self.sums.nearest());
-        for i in lanes(nearest) {
-            let near = Near {
-                t: t[i],
-                row: RowRef::from_lane(rows[i]),
-                primitive: seen.owners[i].primitive,
-                material: seen.materials[i],
-                sample: packet.index[i],
-            };
-            all.see(packet.pixels[i] as usize, near, depth[i], |primitive| plan.objects.of(primitive));
+        if nearest.is_power_of_two() {
+            let i = nearest.trailing_zeros() as usize;
+            all.see(packet.pixels[i] as usize, near[i], depth[i], |primitive| plan.objects.of(primitive));
+        } else {
+            all.see8(&places, &near, &depth, |primitive| plan.objects.of(primitive));
         }
     }
 }
