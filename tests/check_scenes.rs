@@ -80,7 +80,20 @@ fn the_engine_agrees_with_the_reference_where_f32_is_bad() {
         )
     };
     let far = ["type = \"pinhole\"\nvfov = 0.0002", "type = \"orthographic\"\nheight = 3.2"].map(far);
-    let cases = [1e3, 1e5, 1e7].map(ground).into_iter().chain([0.0, 1e-4].map(tip)).chain(far);
+    // Specks: what f32 rounds a center by is as much as shows in a normal.
+    let specks = (0..300).map(|i| {
+        let (x, y) = (0.026 * f64::from(i % 20) - 0.25, 0.026 * f64::from(i / 20) - 0.18);
+        format!(
+            "[[shapes]]\ntype = \"sphere\"\ncenter = [{x}, {y}, {}]\nradius = 0.012\nmaterial = \"clay\"\n",
+            0.01 * x
+        )
+    });
+    let dust = format!(
+        "{view}[camera]\ntype = \"pinhole\"\neye = [7, 11, 29]\ntarget = [0, 0, 0]\nvfov = 0.8\n\
+        [[lights]]\ntype = \"point\"\nposition = [30, 5, 20]\nintensity = [4000, 4000, 4000]\n{}",
+        specks.collect::<String>()
+    );
+    let cases = [1e3, 1e5, 1e7].map(ground).into_iter().chain([0.0, 1e-4].map(tip)).chain(far).chain([dust]);
     let check = |(index, text): (usize, String)| {
         let scene = Scene::from_toml(&text, Path::new(".")).unwrap_or_else(|errors| panic!("{errors}"));
         failure(Path::new(&format!("case {index}")), &scene, 5000)

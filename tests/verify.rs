@@ -184,6 +184,8 @@ fn a_pixel_is_explained() {
         let json: Value = json_of(&text).unwrap_or_else(|| panic!("{code} {text}"));
         let rays = json["rays"].as_array().expect("rays");
         assert!(code == 0 && rays[0]["path"] == 1 && rays.iter().all(|ray| ray["verdict"] == "same"), "{text}");
+        let near = |ray: &Value| ray["ulps"].as_f64().is_none_or(|ulps| ulps.abs() <= 1.0);
+        assert!(rays.iter().all(near) && rays[0]["kernel_t"].is_number() == rays[0]["t"].is_number(), "{text}");
         kinds.extend(rays.iter().map(|ray| ray["kind"].to_string()));
         // The box filter of one sample is that sample: what is shared out is the pixel.
         let shares = json["shares"].as_array().expect("shares");

@@ -64,6 +64,9 @@ impl Direct<'_> {
                 &mut surface,
             );
         }
+        if let (true, RayKind::Camera, Some(exact)) = (self.plan.specks, wave.kind, before) {
+            stores.sharpen_spheres(hit, &wave.tile.hits[p].to_array(), (exact, rays.t_max), &mut surface);
+        }
         let first = exact.len();
         if self.goes_on() {
             self.refine(wave, (p, hit), owners, &mut surface, exact);

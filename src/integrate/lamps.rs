@@ -200,7 +200,7 @@ impl Direct<'_> {
         sink: &mut Sink<R>,
     ) {
         let mut left = *live;
-        let mut from = [Float8::ZERO; PACKETS];
+        let (mut from, mut last) = ([Float8::ZERO; PACKETS], [[usize::MAX; LANES]; PACKETS]);
         while left.iter().any(|left| *left != 0) {
             sink.scratch.renew(None);
             for (p, rays) in wave.tile.packets.iter().enumerate() {
@@ -217,18 +217,18 @@ impl Direct<'_> {
                 for i in bits(left[p]) {
                     let row = sink.scratch.hit(p, i);
                     let Some(kind) = row.kind() else { continue };
-                    // The same place again: f64 found it a rounding further on.
-                    if t.as_array()[i] <= from[p].as_array()[i] {
+                    let place = places[tree.stores().owner(kind, row.row()).primitive as usize];
+                    met |= 1 << i;
+                    // A lit side is met once: it is the same place again, which f64 found a rounding further on.
+                    if std::mem::replace(&mut last[p][i], place) == place {
                         continue;
                     }
-                    let place = places[tree.stores().owner(kind, row.row()).primitive as usize];
                     let share = self.met_share(place, wave, (p, i), t.as_array()[i]);
                     let sum = Vec3x8::lane(&sink.radiance[p], i);
                     let (radiance, weight) = (self.lamps.areas[place].radiance, wave.weight(p, i));
                     sink.radiance[p].set_lane(i, std::array::from_fn(|k| sum[k] + radiance[k] * share * weight[k]));
-                    met |= 1 << i;
                 }
-                (left[p], from[p]) = (met, t * float8(1.0 + NEARER));
+                (left[p], from[p]) = (met, t.fast_max(from[p]) * float8(1.0 + NEARER));
             }
         }
     }

@@ -55,8 +55,10 @@ pub struct RayNote {
     pub met: Option<u32>,
     /// What that is.
     pub what: Option<String>,
-    /// Where the engine met it.
+    /// Where the engine met it, found again in f64 as for hits that are told; rounded once.
     pub t: Option<f32>,
+    /// The same by the f32 kernel alone.
+    pub kernel_t: Option<f32>,
     /// What the reference meets along the same ray (a camera ray before it was rounded), and where.
     pub expected: Option<usize>,
     /// Where.
@@ -124,7 +126,7 @@ pub fn explain(scene: &Scene, (x, y): (i32, i32), sample: u32) -> Result<Explana
     let notes: Vec<Note> = tape.take((x, y)).into_iter().filter(|note| note.event.sample == sample).collect();
     let reference = Reference::relative_to(scene, frame.origin());
     let view = reference.view(renderer.view(), image, &scene.render);
-    let teller = Teller { scene, reference: &reference, view: &view, pixel: (x, y), sample };
+    let teller = Teller { scene, frame: &frame, reference: &reference, view: &view, pixel: (x, y), sample };
     Ok(Explanation {
         schema: 1,
         pixel: [x, y],
@@ -138,6 +140,7 @@ pub fn explain(scene: &Scene, (x, y): (i32, i32), sample: u32) -> Result<Explana
 
 struct Teller<'a> {
     scene: &'a Scene,
+    frame: &'a Frame<'a>,
     reference: &'a Reference,
     view: &'a View,
     pixel: (i32, i32),
@@ -164,7 +167,8 @@ impl Teller<'_> {
         let first = cast.met.and_then(|met| of(met as usize));
         let second = places.iter().find(|place| place.hit && Some(place.primitive as u32) != cast.met);
         let ([a, b, c], [i, j, k]) = (cast.ray.origin, cast.ray.dir);
-        let t = cast.met.map(|_| cast.t);
+        let again = |met| self.frame.found_again(met, (ray.origin, ray.dir), f64::from(cast.t));
+        let t = cast.met.map(|met| again(met).map_or(cast.t, |t| t as f32));
         let ulps = hit.filter(|hit| Some(hit.primitive as u32) == cast.met).zip(t).map(|(hit, t)| ulps(t, hit.t));
         RayNote {
             path,
@@ -174,6 +178,7 @@ impl Teller<'_> {
             met: cast.met,
             what: cast.met.map(|met| self.what(met as usize)),
             t,
+            kernel_t: cast.met.map(|_| cast.t),
             expected: hit.map(|hit| hit.primitive),
             expected_t: hit.map(|hit| hit.t),
             ulps,
@@ -268,9 +273,10 @@ impl RayNote {
         let pad = "  ".repeat(depth.saturating_sub(1));
         let [x, y, z, _, a, b, c, _] = self.ray;
         writeln!(f, "{pad}{} ray (path {}) from ({x}, {y}, {z}) toward ({a}, {b}, {c})", self.kind, self.path)?;
-        match (self.met, self.t) {
-            (Some(met), Some(t)) => {
-                writeln!(f, "{pad}  met primitive {met} ({}) at t = {t}", self.what.as_deref().unwrap_or_default())?;
+        match (self.met, self.t, self.kernel_t) {
+            (Some(met), Some(t), Some(kernel)) => {
+                let what = self.what.as_deref().unwrap_or_default();
+                writeln!(f, "{pad}  met primitive {met} ({what}) at t = {t} (f32 kernel: {kernel})")?;
             }
             _ => writeln!(f, "{pad}  met nothing")?,
         }

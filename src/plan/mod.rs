@@ -31,6 +31,9 @@ pub struct Plan<'s> {
     pub origin: DVec3,
     /// Camera rays meet surfaces in f64, since f32 would show.
     pub sharp: bool,
+    /// Some spheres are so small for their distance that f32 would show in how camera rays see them shaded: those are met
+    /// in f64.
+    pub specks: bool,
     /// The most that the coordinates of origins are which were rounded to f32, relative to `origin`.
     pub rounded_origins: DVec3,
     /// By material: the sides that are seen.
@@ -95,6 +98,7 @@ impl<'s> Plan<'s> {
             scene,
             origin,
             sharp: false,
+            specks: false,
             rounded_origins: DVec3::ZERO,
             visible,
             sides,
@@ -116,7 +120,8 @@ impl<'s> Plan<'s> {
     /// Plans for the rays of a camera, in a picture of so many rows.
     pub fn seen_from(allowed: SkipSet, scene: &'s Scene, camera: &Camera, rows: u32) -> Self {
         let (origin, sharp) = origin::origin(scene, camera, rows);
-        Plan { sharp, ..Plan::leaving_out(allowed, scene, origin) }
+        let specks = origin::has_specks(scene, camera.eye);
+        Plan { sharp, specks, ..Plan::leaving_out(allowed, scene, origin) }
     }
 
     /// Leaves out the layers that are not among those asked for, in place of the scene's.

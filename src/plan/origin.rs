@@ -11,6 +11,8 @@ use crate::scene::{Camera, Lens, Scene, Shape, bounding_balls};
 
 /// A pixel that covers less than this share of the distance is seen through a long lens: some thousand roundings.
 const NARROW: f64 = 1e-4;
+/// A sphere is a speck where the eye is so many times its radius away: f32 rounds its normals by as many roundings.
+const SPECK: f64 = 128.0;
 /// A scene is far where the eye is away from its middle so many times its radius.
 const FAR: f64 = 8.0;
 
@@ -42,6 +44,15 @@ pub fn origin(scene: &Scene, camera: &Camera, rows: u32) -> (DVec3, bool) {
     let off = |point: DVec3| (point - eye - middle).length_squared();
     let points = scene.primitives().filter_map(|primitive| point_of(&primitive.shape));
     (points.min_by(|a, b| off(*a).total_cmp(&off(*b))).unwrap_or(eye), true)
+}
+
+/// Whether any sphere is a speck seen from the eye.
+pub fn has_specks(scene: &Scene, eye: DVec3) -> bool {
+    scene.primitives().any(|primitive| match &*primitive.shape {
+        Shape::Sphere(sphere) => (sphere.center - eye).length_squared() > (SPECK * sphere.radius).powi(2),
+        Shape::Plane(_) | Shape::Disk(_) | Shape::Polygon(_) => false,
+        Shape::Box(_) | Shape::Cylinder(_) | Shape::Cone(_) => false,
+    })
 }
 
 /// The middle of all that has bounds, relative to the eye, and how far it reaches from there, by the boxes of it.

@@ -34,10 +34,12 @@ use self::coverage::Coverage;
 use crate::accel::Tree;
 use crate::film::{Picture, Window};
 use crate::integrate::{CameraRays, Direct, Lamps, RayCounts, Record};
+use crate::lanes::LANES;
 use crate::output::{self, Description, Losses, Options, OutputError};
-use crate::plan::{InvalidScene, Plan, Sight, Skip, SkipSet, validate};
+use crate::plan::{InvalidScene, Kind, Plan, Sight, Skip, SkipSet, validate};
 use crate::reference::Reference;
 use crate::scene::{Aov, Camera, ImageSettings, Integrator, Layers, RenderSettings, Scene, SceneSum};
+use crate::shapes::{Ray64, RowRef};
 
 /// Which tracer finds the hits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -517,6 +519,21 @@ impl<'s> Frame<'s> {
     /// What the coordinates of its rays are relative to.
     pub fn origin(&self) -> DVec3 {
         self.plan.origin
+    }
+
+    /// Where a ray, given in f64 relative to the origin, meets a primitive near `t`: found again in f64 as for a [`Hit`].
+    ///
+    /// [`Hit`]: crate::Hit
+    pub fn found_again(&self, primitive: u32, (origin, dir): (DVec3, DVec3), t: f64) -> Option<f64> {
+        let stores = self.tree.stores();
+        let ray = Ray64 { origin, dir, t_min: 0.0, t_max: f64::INFINITY };
+        let found = |kind: Kind, row: usize| {
+            let found = stores.refine(RowRef::new(kind, row), &ray, t)?;
+            (stores.owner(kind, row).primitive == primitive).then_some(found.t)
+        };
+        let rows = |kind: Kind| (0..stores.blocks(kind) * LANES).filter_map(move |row| found(kind, row));
+        let off = |place: &f64| (place - t).abs();
+        Kind::ALL.into_iter().flat_map(rows).min_by(|a, b| off(a).total_cmp(&off(b)))
     }
 
     /// Whether rays go on from some material in use.

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::{Part, Ray64, Store, Surface8, Surface64, noise};
-use crate::lanes::{Columns, ExactPacket, Float8, LANES, Mask8, RayPacket, bits};
+use crate::lanes::{Columns, ExactPacket, Float8, LANES, Mask8, RayPacket, Vec3x8, bits};
 use crate::plan::{
     BoxPart, ConePart, CylinderPart, DiskPart, Kind, Owner, Parts, PlanePart, PolygonPart, SpherePart, TurnedBoxPart,
 };
@@ -188,6 +188,28 @@ impl Stores {
             if let Some(found) = self.refine(RowRef::from_lane(hits[lane]), &ray, f64::from(t.as_array()[lane])) {
                 surface.set(lane, &found);
             }
+        }
+    }
+
+    /// Takes the normals of those lanes of a surface that met spheres from f64, of rays before they were rounded.
+    #[inline(never)]
+    pub fn sharpen_spheres(
+        &self,
+        lanes: u32,
+        hits: &[f32; LANES],
+        (exact, t): (&ExactPacket, Float8),
+        surface: &mut Surface8,
+    ) {
+        let (mut parts, mut spheres) = ([None; LANES], 0);
+        for lane in bits(lanes) {
+            let row = RowRef::from_lane(hits[lane]);
+            if row.kind() == Some(Kind::Sphere) {
+                (parts[lane], spheres) = (self.spheres.part(row.row()), spheres | 1 << lane);
+            }
+        }
+        if spheres != 0 {
+            let normal = super::sphere::exact_normals(&parts, exact, t.as_array());
+            surface.normal = Vec3x8::select(Mask8::from_bits(spheres), normal, surface.normal);
         }
     }
 
