@@ -2,7 +2,7 @@
 """Render a neutral scene with Mitsuba 3.
 
 mi_render.py SCENE_DIR VARIANT SPP OUT.exr [--area] [--spheres ellipsoids|sphere]
-             [--integrator direct|path] [--threads N] [--reps N] [--seed S] [--res N]
+             [--integrator direct|path] [--depth N] [--threads N] [--reps N] [--seed S] [--res N]
 Prints one line: build (scene load) s, first render s (with kernel compilation), min of warm renders s.
 Spheres: `sphere` = one plugin per sphere (default), `ellipsoids` = one shape per material
 (loads fast, but Mitsuba 3.9.1 draws its small spheres as boxes: Mitsuba 3.9.1 only).
@@ -13,7 +13,7 @@ import numpy as np
 ap = argparse.ArgumentParser()
 ap.add_argument('scene'); ap.add_argument('variant'); ap.add_argument('spp', type=int); ap.add_argument('out')
 ap.add_argument('--area', action='store_true'); ap.add_argument('--spheres', default='auto')
-ap.add_argument('--integrator', default='auto'); ap.add_argument('--threads', type=int, default=2)
+ap.add_argument('--integrator', default='auto'); ap.add_argument('--depth', type=int, default=0, help='of paths, as Mitsuba counts'); ap.add_argument('--threads', type=int, default=2)
 ap.add_argument('--reps', type=int, default=0); ap.add_argument('--seed', type=int, default=0)
 ap.add_argument('--res', type=int, default=0, help='square resolution override')
 A = ap.parse_args()
@@ -30,7 +30,7 @@ c = S['camera']; L = S['light']
 if A.res: c['width'] = c['height'] = A.res
 integ = A.integrator if A.integrator != 'auto' else ('path' if S['max_depth'] else 'direct')
 d = {'type': 'scene',
-     'integrator': {'type': 'path', 'max_depth': S['max_depth'] + 2, 'rr_depth': 1000} if integ == 'path' else
+     'integrator': {'type': 'path', 'max_depth': A.depth or S['max_depth'] + 2, 'rr_depth': 1000} if integ == 'path' else
                    {'type': 'direct', 'emitter_samples': 1, 'bsdf_samples': 0},
      'sensor': {'type': 'perspective', 'fov': c['vfov_deg'], 'fov_axis': 'y',
                 'to_world': T().look_at(origin=list(c['origin']), target=list(c['target']), up=list(c['up'])),

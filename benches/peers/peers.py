@@ -8,7 +8,8 @@ rays    million rays per CPU second, one thread, on the very rays that embree_be
         packet width and flag against `octray query`. Hit counts are printed beside each other.
 frames  the same picture by every renderer, 2 threads: seconds of tracing as each of them reports it, and of the whole process.
 nff     procedural scenes (NFF) by Tachyon and octray, 512 x 512, mirrors and glass to depth 5.
-errors  an area light: seconds against relative MSE to each renderer's own converged picture, octray and Mitsuba.
+errors  an area light, direct and with paths: seconds against relative MSE to each renderer's own converged picture, octray (as many
+        samples for all, and to noise levels) and Mitsuba.
 
 What is not installed is left out, and the table says so. setup.sh installs it and makes the scenes. Everything of one table
 row is measured in turns in one run; the best of the repetitions counts, for every renderer alike.
@@ -186,42 +187,59 @@ def rel_mse(a, b):
     out = subprocess.run([PY, '-c', code], capture_output=True, text=True)
     return float(out.stdout) if out.stdout.strip() else None
 
+# What is compared at equal error: scene, its file, words for octray, words for Mitsuba. A path of octray's depth 3 has Mitsuba's 4.
+CASES = [('flake, direct light', 'flake', [], []),
+         ('polys, direct light', 'polys', [], []),
+         ('flake, paths', 'flake', ['--integrator', 'path', '--max-depth', '3'], ['--integrator', 'path', '--depth', '4'])]
+CONVERGED = 4096
+
 def errors():
-    head('Area light, direct light, 256 x 256, 2 threads: seconds against relative MSE', "Each to its own converged picture (octray 4,096 spp, Mitsuba 4,096 spp), both with a box filter.")
-    print('| scene | renderer | spp | seconds | relative MSE |\n|---|---|---|---|---|')
-    for name in [n for n in SCENES if n in ('flake', 'polys')]:
+    head('Area light, 256 x 256, 2 threads: seconds against relative MSE',
+         f'Each to its own converged picture ({CONVERGED:,} spp), all with a box filter. Seconds of tracing, best of three; Mitsuba warm.')
+    print('| case | renderer | spp or noise level | seconds | relative MSE |\n|---|---|---|---|---|')
+    for label, name, own, their in [case for case in CASES if case[1] in SCENES]:
         text = open(scene(name, 'scene_area.toml')).read().replace('[image]\n', '[image]\nfilter = "box"\nfilter_radius = 0.5\n', 1)
         boxed = scene(name, 'scene_area_box.toml'); open(boxed, 'w').write(text)
-        curves = {'octray': [], 'Mitsuba llvm': []}
-        def ours(spp, out, seed):
+        def ours(words, out, seed):
             stats = RES + '/stats.json'
-            done = once([OCTRAY, 'render', boxed, '-o', out, '--float', '--spp', str(spp), '--resolution', '256x256', '-t', '2', '--seed', str(seed), '--stats', stats, '-q'])
+            done = once([OCTRAY, 'render', boxed, '-o', out, '--float', *words, '--resolution', '256x256', '-t', '2', '--seed', str(seed), '--stats', stats, '-q', *own])
             return done and json.load(open(stats))['seconds']['trace']
-        def theirs(spp, out, seed):
+        def theirs(words, out, seed):
             if 'Mitsuba' not in versions(): return None
-            done = once([PY, HERE + '/mi_render.py', scene(name), 'llvm_ad_rgb', str(spp), out, '--area', '--res', '256', '--reps', '2', '--seed', str(seed)])
+            done = once([PY, HERE + '/mi_render.py', scene(name), 'llvm_ad_rgb', words[1], out, '--area', '--res', '256', '--reps', '3', '--seed', str(seed), *their])
             return done and reported(done[2], 'render_warm ')
-        for who, run in (('octray', ours), ('Mitsuba llvm', theirs)):
-            reference = f'{RES}/{name}_{who[:3]}_reference.exr'
-            say('reference', name, who)
-            if not run(4096, reference, 99): continue
-            for spp in (1, 4, 16, 64, 256):
-                out = RES + '/error.exr'; times = [t for t in (run(spp, out, 17) for _ in range(3)) if t]
-                error = times and rel_mse(out, reference)
-                if error:
-                    curves[who].append((min(times), error))
-                    print(f'| {name} | {who} | {spp} | {min(times):.4f} | {error:.3e} |', flush=True)
-        print_ratio(name, *curves.values())
+        reference = {run: f'{RES}/{name}_{run.__name__}_reference.exr' for run in (ours, theirs)}
+        for run in reference:
+            say('reference', label, run.__name__)
+            if not run(['--spp', str(CONVERGED)], reference[run], 99): reference[run] = None
+        if all(reference.values()):
+            print(f'| {label} | the converged pictures to each other | | | {rel_mse(*reference.values()):.1e} |', flush=True)
+        counts = [['--spp', str(4 ** k)] for k in range(6)]
+        levels = [['--noise', str(0.2 / 2 ** k)] for k in range(5)]
+        curves = [curve(label, who, run, words, reference[run]) for who, run, words in
+                  (('octray', ours, counts), ('octray, --noise', ours, levels), ('Mitsuba llvm', theirs, counts)) if reference[run]]
+        if len(curves) == 3: print_ratios(label, *curves)
 
-def print_ratio(name, ours, theirs):
+def curve(label, who, run, settings, reference):
+    """Times and errors, printed as they come."""
+    points = []
+    for words in settings:
+        out = RES + '/error.exr'; times = [t for t in (run(words, out, 17) for _ in range(3 if who[0] == 'o' else 1)) if t]
+        error = times and rel_mse(out, reference)
+        if error:
+            points.append((min(times), error))
+            print(f'| {label} | {who} | {words[1]} | {min(times):.4f} | {error:.3e} |', flush=True)
+    return points
+
+def print_ratios(label, uniform, noise, theirs):
     """Times at equal error, where the curves overlap: straight lines between points of logarithms."""
-    if len(ours) < 2 or len(theirs) < 2: return
-    line = lambda c: (np.log([e for _, e in c])[::-1], np.log([t for t, _ in c])[::-1])
-    (a, ta), (b, tb) = line(ours), line(theirs)
-    low, high = max(a[0], b[0]), min(a[-1], b[-1])
-    if low < high:
-        ratio = [np.exp(np.interp(e, b, tb) - np.interp(e, a, ta)) for e in np.linspace(low, high, 9)]
-        print(f'| {name} | **octray needs 1/{min(ratio):.1f} to 1/{max(ratio):.1f} of the time at equal error** | | | {np.exp(high):.1e} to {np.exp(low):.1e} |', flush=True)
+    def at(points, error):
+        points = sorted((e, t) for t, e in points); e, t = np.log(np.array(points)).T
+        return np.exp(np.interp(np.log(error), e, t)) if e[0] <= np.log(error) <= e[-1] else None
+    for error in (1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4):
+        own = [t for t in (at(uniform, error), at(noise, error)) if t]; other = at(theirs, error)
+        if own and other:
+            print(f'| {label} | **at {error:.0e}** | octray {min(own):.4f} s, Mitsuba {other:.4f} s | **1/{other / min(own):.1f}** | |', flush=True)
 
 STAGES = dict(rays=rays, frames=frames, nff=nff, errors=errors)
 for stage in A.stages or ['rays', 'frames', 'nff']:
