@@ -27,7 +27,6 @@ pub use self::manifest::Beside;
 pub(super) use self::manifest::is_about as is_about_mattes;
 
 use self::layout::Part;
-use self::zip::Packer;
 use super::color::{self, Primaries};
 use super::pixel_hash::{Digests, PixelHash};
 use super::{Description, EncodeError, Losses};
@@ -182,12 +181,12 @@ fn pack(picture: &Picture, parts: &[Part<'_>], headers: &[Header]) -> Result<Vec
         headers: headers.iter().cloned().collect(),
     };
     let blocks: Vec<(usize, BlockIndex)> = meta.enumerate_ordered_header_block_indices().collect();
-    let one = |packer: &mut Packer, (index, block): (usize, BlockIndex)| {
+    let one = |(index, block): (usize, BlockIndex)| {
         let (part, header) = (&parts[block.layer], &headers[block.layer]);
         let block = UncompressedBlock { index: block, data: rows(picture, part, header, block) };
         let exact = !header.compression.may_loose_data();
         let mut digests = if exact { digest(part, header, &block) } else { Vec::new() };
-        let chunk = chunk(block, headers, packer)?;
+        let chunk = chunk(block, headers)?;
         if !exact {
             // The hash is of what a reader finds.
             let back = UncompressedBlock::decompress_chunk(chunk.clone(), &meta, true).map_err(EncodeError::new)?;
@@ -195,12 +194,11 @@ fn pack(picture: &Picture, parts: &[Part<'_>], headers: &[Header]) -> Result<Vec
         }
         Ok(Packed { index, chunk, digests })
     };
-    // Each state takes as long to make as some lines to pack.
-    blocks.into_par_iter().with_min_len(32).map_init(Packer::new, one).collect()
+    blocks.into_par_iter().with_min_len(32).map(one).collect()
 }
 
 /// A block as it is stored.
-fn chunk(block: UncompressedBlock, headers: &[Header], packer: &mut Packer) -> Result<Chunk, EncodeError> {
+fn chunk(block: UncompressedBlock, headers: &[Header]) -> Result<Chunk, EncodeError> {
     use exr::prelude::Compression::{ZIP1, ZIP16};
     let (layer_index, header) = (block.index.layer, &headers[block.index.layer]);
     if cfg!(target_endian = "big") || !matches!(header.compression, ZIP1 | ZIP16) {
@@ -209,7 +207,7 @@ fn chunk(block: UncompressedBlock, headers: &[Header], packer: &mut Packer) -> R
     let y = i32::try_from(block.index.pixel_position.y()).map_err(EncodeError::new)?;
     let lines = CompressedScanLineBlock {
         y_coordinate: header.own_attributes.layer_position.y() + y,
-        compressed_pixels_le: packer.pack(block.data),
+        compressed_pixels_le: zip::pack(block.data),
     };
     Ok(Chunk { layer_index, compressed_block: CompressedBlock::ScanLine(lines) })
 }

@@ -6,21 +6,32 @@
 //! Source: OpenEXR, `internal_zip.c`: bytes at even places, then those at odd ones; each as its difference from the one
 //! before it, plus 128; then zlib; and as they were where that is no shorter.
 
+use std::cell::RefCell;
+
 use flate2::{Compress, Compression, FlushCompress, Status};
 
+thread_local! {
+    /// Of this thread: it takes as long to make as some lines to pack, and small pictures have not many.
+    static OWN: RefCell<Packer> = RefCell::new(Packer::new());
+}
+
+/// The bytes of a chunk, little-endian, as the file holds them.
+pub(super) fn pack(bytes: Vec<u8>) -> Vec<u8> {
+    OWN.with_borrow_mut(|packer| packer.pack(bytes))
+}
+
 /// What a thread keeps from chunk to chunk.
-pub(super) struct Packer {
+struct Packer {
     zlib: Compress,
     sorted: Vec<u8>,
 }
 
 impl Packer {
-    pub fn new() -> Self {
+    fn new() -> Self {
         Packer { zlib: Compress::new(Compression::fast(), true), sorted: Vec::new() }
     }
 
-    /// The bytes of a chunk, little-endian, as the file holds them.
-    pub fn pack(&mut self, bytes: Vec<u8>) -> Vec<u8> {
+    fn pack(&mut self, bytes: Vec<u8>) -> Vec<u8> {
         sort(&bytes, &mut self.sorted);
         self.zlib.reset();
         // No more than this is of use.
