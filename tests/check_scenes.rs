@@ -93,7 +93,14 @@ fn the_engine_agrees_with_the_reference_where_f32_is_bad() {
         [[lights]]\ntype = \"point\"\nposition = [30, 5, 20]\nintensity = [4000, 4000, 4000]\n{}",
         specks.collect::<String>()
     );
-    let cases = [1e3, 1e5, 1e7].map(ground).into_iter().chain([0.0, 1e-4].map(tip)).chain(far).chain([dust]);
+    // All round, with a row of pixels that looks along the floor.
+    let around = format!(
+        "{}[camera]\ntype = \"panoramic\"\neye = [0, 1.2, 0]\ntarget = [0, 1.2, -1]\n\
+        [[lights]]\ntype = \"point\"\nposition = [3, 5, 2]\nintensity = [90, 90, 90]\n\
+        [[shapes]]\ntype = \"plane\"\npoint = [0, 0, 0]\nnormal = [0, 1, 0]\nmaterial = \"clay\"\n",
+        view.replace("height = 72", "height = 83")
+    );
+    let cases = [1e3, 1e5, 1e7].map(ground).into_iter().chain([0.0, 1e-4].map(tip)).chain(far).chain([dust, around]);
     let check = |(index, text): (usize, String)| {
         let scene = Scene::from_toml(&text, Path::new(".")).unwrap_or_else(|errors| panic!("{errors}"));
         failure(Path::new(&format!("case {index}")), &scene, 5000)

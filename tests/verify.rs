@@ -1,8 +1,11 @@
 //! Pictures that are confirmed, and the commands that make errors visible, as a user meets them.
 
+mod command;
+
 use std::path::Path;
 use std::process::Command;
 
+use command::clay;
 use serde_json::Value;
 
 /// Runs octray in a folder: its exit code, and what it says.
@@ -65,39 +68,12 @@ fn pictures_of_all_settings_are_confirmed_by_their_headers_alone() {
 #[test]
 fn frames_and_cameras_are_confirmed() {
     let room = tempfile::tempdir().expect("a folder");
-    let scene = r#"
-format = 1
-image = { width = 32, height = 24, spp = 2 }
-
-[[cameras]]
-name = "front side"
-type = "pinhole"
-eye = [0, 0, 8]
-target = [0, 0, 0]
-vfov = 45
-
-[[cameras]]
-name = "top"
-type = "pinhole"
-eye = [0, 8, 1]
-target = [0, 0, 0]
-vfov = 45
-
-[materials.clay]
-type = "diffuse"
-albedo = [0.5, 0.5, 0.5]
-
-[[lights]]
-type = "point"
-position = [5, 6, 8]
-intensity = [350, 350, 350]
-
-[[shapes]]
-type = "sphere"
-center = { keys = [[1, [-1, 0, 0]], [3, [1, 0, 0]]] }
-radius = 1
-material = "clay"
-"#;
+    let camera = |name: &str, eye: &str| {
+        format!("[[cameras]]\nname = \"{name}\"\ntype = \"pinhole\"\neye = {eye}\ntarget = [0, 0, 0]\nvfov = 45\n")
+    };
+    let cameras = camera("front side", "[0, 0, 8]") + &camera("top", "[0, 8, 1]");
+    let turning = "{ keys = [[1, [-1, 0, 0]], [3, [1, 0, 0]]] }";
+    let scene = clay("width = 32, height = 24, spp = 2", &cameras, ("[5, 6, 8]", 350.0), &[turning]);
     std::fs::write(room.path().join("turn.toml"), scene).expect("a file");
     let args =
         ["render", "turn.toml", "--out-dir", "out", "--frames", "1-3", "--camera", "all", "--aov", "motion", "-q"];
@@ -209,37 +185,9 @@ fn check_writes_layers_and_a_heat_map_that_show_what_is_wrong() {
     let room = folder(&["fig5.toml"]);
     let at = room.path();
     // Two spheres one behind the other by less than f32 tells from so far away, the farther one first.
-    let far = r#"
-format = 1
-image = { width = 64, height = 48, spp = 1 }
-
-[camera]
-type = "pinhole"
-eye = [0, 0, 100000]
-target = [0, 0, 0]
-vfov = 0.002
-
-[materials.clay]
-type = "diffuse"
-albedo = [0.5, 0.5, 0.5]
-
-[[lights]]
-type = "point"
-position = [5, 6, 99999]
-intensity = [1e10, 1e10, 1e10]
-
-[[shapes]]
-type = "sphere"
-center = [0.3, 0.2, 0.099]
-radius = 1
-material = "clay"
-
-[[shapes]]
-type = "sphere"
-center = [0.3, 0.2, 0.1]
-radius = 1
-material = "clay"
-"#;
+    let camera = "[camera]\ntype = \"pinhole\"\neye = [0, 0, 100000]\ntarget = [0, 0, 0]\nvfov = 0.002\n";
+    let spheres = ["[0.3, 0.2, 0.099]", "[0.3, 0.2, 0.1]"];
+    let far = clay("width = 64, height = 48, spp = 1", camera, ("[5, 6, 99999]", 1e10), &spheres);
     std::fs::write(at.join("far.toml"), far).expect("a file");
     let layers = |scene: &str, more: &[&str]| {
         let args = ["check", scene, "--resolution", "64x48", "--layers", "d.exr", "--heatmap", "d.png", "--json"];

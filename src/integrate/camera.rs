@@ -30,8 +30,9 @@ enum Optics {
     /// It starts elsewhere on a lens, whose radii right and up these are, and goes to the same point at
     /// so many lengths of its direction.
     Lens([DVec3; 2], f64),
-    /// Its direction goes round: right, up and forward; turns a pixel right and down, in radians.
-    Round([DVec3; 3], [f64; 2]),
+    /// Its direction goes round: right, up and forward; turns a pixel right and down, in radians; the middle of the
+    /// picture in pixels, from which turns are counted so that the horizon is at 0.
+    Round([DVec3; 3], [f64; 2], [f64; 2]),
 }
 
 impl CameraRays {
@@ -45,7 +46,9 @@ impl CameraRays {
         let optics = match camera.lens {
             Lens::Pinhole { .. } | Lens::Orthographic { .. } => Optics::Straight,
             Lens::ThinLens { aperture, focus, .. } => Optics::Lens([right * aperture, up * aperture], focus),
-            Lens::Panoramic => Optics::Round([right, up, forward], [TAU / width, PI / height]),
+            Lens::Panoramic => {
+                Optics::Round([right, up, forward], [TAU / width, PI / height], [0.5 * width, 0.5 * height])
+            }
         };
         let (dir, origin) = match camera.lens {
             Lens::Pinhole { vfov } | Lens::ThinLens { vfov, .. } => {
@@ -100,7 +103,7 @@ impl CameraRays {
         match &self.optics {
             Optics::Straight => {}
             Optics::Lens(radii, focus) => rays.through_lens(samples, radii, *focus),
-            Optics::Round(axes, turns) => rays.around(points, axes, *turns),
+            Optics::Round(axes, turns, middle) => rays.around(points, axes, (turns, middle)),
         }
     }
 
@@ -207,11 +210,11 @@ impl ExactPacket {
         }
     }
 
-    /// All round: points of the picture in pixels, right, up and forward, radians a pixel.
-    fn around(&mut self, points: &[[f64; LANES]; 2], axes: &[DVec3; 3], turns: [f64; 2]) {
+    /// All round: points of the picture in pixels, right, up and forward, radians a pixel from the middle on.
+    fn around(&mut self, points: &[[f64; LANES]; 2], axes: &[DVec3; 3], (turns, middle): (&[f64; 2], &[f64; 2])) {
         for (lane, (x, y)) in points[0].iter().zip(&points[1]).enumerate() {
-            let (sin, cos) = (x * turns[0] - PI).sin_cos();
-            let (level, height) = (y * turns[1]).sin_cos();
+            let (sin, cos) = ((x - middle[0]) * turns[0]).sin_cos();
+            let (height, level) = ((middle[1] - y) * turns[1]).sin_cos();
             let (origin, _) = self.lane(lane);
             self.set_lane(lane, origin, (axes[0] * sin + axes[2] * cos) * level + axes[1] * height);
         }

@@ -9,7 +9,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 /// Size in pixels.
 const SIZE: (u32, u32) = (760, 480);
 /// Colours that the colour-blind can tell apart: Okabe and Ito, "Color universal design", 2008.
-const COLORS: [RGBColor; 8] = [
+const COLORS: [RGBColor; 10] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
@@ -18,6 +18,8 @@ const COLORS: [RGBColor; 8] = [
     RGBColor(86, 180, 233),
     RGBColor(0, 0, 0),
     RGBColor(140, 140, 140),
+    RGBColor(140, 86, 26),
+    RGBColor(106, 61, 154),
 ];
 const FONT: &str = "sans-serif";
 

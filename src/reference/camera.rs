@@ -110,9 +110,9 @@ impl View {
                 (self.eye + off, sharp - off)
             }
             Lens::Panoramic => {
-                let (azimuth, polar) = (TAU * (x / self.width - 0.5), PI * y / self.height);
+                let (azimuth, elevation) = (TAU * (x / self.width - 0.5), PI * (0.5 - y / self.height));
                 let level = azimuth.sin() * self.right + azimuth.cos() * self.forward;
-                (self.eye, polar.sin() * level + polar.cos() * self.up)
+                (self.eye, elevation.cos() * level + elevation.sin() * self.up)
             }
         };
         Ray { origin, dir, t_min: 0.0, t_max: f64::INFINITY }

@@ -38,6 +38,18 @@ radius = 1
 material = "mirror"
 "#;
 
+/// A scene of clay spheres of radius 1 under a point light: what `[image]` says, the cameras, place and intensity of the
+/// light, and the centers of the spheres, as they stand in a scene file.
+pub fn clay(image: &str, cameras: &str, (place, intensity): (&str, f64), centers: &[&str]) -> String {
+    let sphere =
+        |center: &&str| format!("[[shapes]]\ntype = \"sphere\"\ncenter = {center}\nradius = 1\nmaterial = \"clay\"\n");
+    let spheres: String = centers.iter().map(sphere).collect();
+    format!(
+        "format = 1\nimage = {{ {image} }}\n{cameras}[materials.clay]\ntype = \"diffuse\"\nalbedo = [0.5, 0.5, 0.5]\n\
+        [[lights]]\ntype = \"point\"\nposition = {place}\nintensity = [{intensity}, {intensity}, {intensity}]\n{spheres}"
+    )
+}
+
 /// A directory for one test, with `scene.toml` in it.
 pub struct Room(TempDir);
 
