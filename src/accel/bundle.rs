@@ -23,7 +23,7 @@ struct Interval {
 
 /// Rays go together where their directions spread no further than this share of the largest coordinate, and their
 /// origins no further than this share of the scene.
-const SPREAD: f32 = 0.05;
+pub const SPREAD: f32 = 0.05;
 
 impl Bundle {
     /// Bounds of the packets of `live`. Rays that ask for `ANY` hit are taken with directions of length 1, whatever they

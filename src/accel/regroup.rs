@@ -3,6 +3,7 @@
 //! What neighbouring pixels see may lie far apart in depth, and so do the rays between there and a light: tiles of
 //! them are wide, and overlap. Sorted along a Z curve the same rays fill tiles that are narrow.
 
+use super::bundle::SPREAD;
 use super::tile::{PACKETS, Tile};
 use crate::lanes::{Float8, LANES, Mask8, RayPacket, Vec3x8, bits, float8, greatest, least};
 
@@ -11,9 +12,11 @@ const TILE: usize = PACKETS * LANES;
 /// Rays are sorted into a square of cells, so many along an edge.
 const EDGE: usize = 64;
 /// Tiles that overlap so many times on average are taken apart.
-const OVERLAP: f32 = 4.0;
+const OVERLAP: f32 = 2.0;
 /// The cell of dead rays.
 const DEAD: usize = EDGE * EDGE;
+/// A light that is so many lengths of the scene away counts as distant.
+const FAR: f32 = 16.0;
 /// Fewer tiles are not worth it.
 const FEWEST: usize = 4;
 
@@ -22,7 +25,7 @@ const FEWEST: usize = 4;
 pub struct Regroup {
     /// Unit directions.
     dirs: Points,
-    /// Where the lines that the rays are on pass zero, lengths of the scene.
+    /// Where the lines that the rays are on pass zero, for rays whose directions hardly differ.
     feet: Points,
     /// By ray its cell along a Z curve, [`DEAD`] where it is dead.
     cells: Vec<u16>,
@@ -57,16 +60,16 @@ impl Regroup {
         }
         let common = tiles[0].common.filter(|_| tiles.iter().all(|tile| tile.common == tiles[0].common));
         self.dirs.take(tiles, |rays| rays.dir * rays.inv_dd.sqrt());
-        let mut points = &self.dirs;
+        let (mut points, mut narrow) = (&self.dirs, SPREAD);
         if common.is_none() {
             let unit = |rays: &RayPacket| rays.dir * rays.inv_dd.sqrt();
             let foot = |rays: &RayPacket| unit(rays).mul_add(-rays.origin.dot(unit(rays)), rays.origin);
-            self.feet.take(tiles, |rays| foot(rays) * float8(1.0 / size));
-            if self.feet.widest() > self.dirs.widest() {
-                points = &self.feet;
+            self.feet.take(tiles, foot);
+            if self.feet.widest() > FAR * size * self.dirs.widest() {
+                (points, narrow) = (&self.feet, SPREAD * size);
             }
         }
-        if !points.overlap() {
+        if !points.overlap(narrow) {
             return None;
         }
         points.find_cells(tiles, &mut self.cells);
@@ -170,11 +173,13 @@ impl Points {
         }
     }
 
-    /// Whether the tiles overlap on these axes so often that other ones would be much narrower.
-    fn overlap(&self) -> bool {
+    /// Whether the tiles overlap on these axes so often that other ones would be much narrower, and so `narrow` that they
+    /// go down together.
+    fn overlap(&self, narrow: f32) -> bool {
         let [a, b] = self.axes();
         let area = |extent: &[f32; 3]| extent[a] * extent[b];
-        self.extents.iter().map(area).sum::<f32>() >= OVERLAP * area(&self.extent)
+        let (all, tiles) = (area(&self.extent), self.extents.len() as f32);
+        self.extents.iter().map(area).sum::<f32>() >= OVERLAP * all && all <= narrow * narrow * tiles
     }
 
     /// The cells of all rays along a Z curve.
@@ -190,7 +195,7 @@ impl Points {
             let number = |x: f32| x.to_bits() as usize % EDGE;
             let mut eight = [DEAD as u16; LANES];
             for (i, cell) in eight.iter_mut().enumerate() {
-                let z = SPREAD[number(a[i])] | SPREAD[number(b[i])] << 1;
+                let z = EVERY_SECOND[number(a[i])] | EVERY_SECOND[number(b[i])] << 1;
                 *cell = if live >> i & 1 == 1 { z } else { *cell };
             }
             cells.extend_from_slice(&eight);
@@ -202,7 +207,7 @@ impl Points {
 const INTEGERS: f32 = 8_388_608.0;
 
 /// The bits of numbers on every second place.
-const SPREAD: [u16; EDGE] = {
+const EVERY_SECOND: [u16; EDGE] = {
     let (mut table, mut i) = ([0; EDGE], 0);
     while i < EDGE {
         let mut bit = 0;
@@ -250,6 +255,17 @@ mod tests {
         assert!(Regroup::default().sort(&tiles(false), 1.0).is_none());
     }
 
+    /// Every which way: no order would make narrow tiles of them.
+    #[test]
+    fn tiles_of_rays_that_have_nothing_in_common_stay_as_they_are() {
+        let mut from = tiles(true);
+        for rays in from.iter_mut().flat_map(|tile| &mut tile.packets) {
+            rays.dir.z = rays.dir.z * float8(0.1);
+            *rays = RayPacket::within(rays.origin, rays.dir, rays.t_min, rays.t_max);
+        }
+        assert!(Regroup::default().sort(&from, 1.0).is_none());
+    }
+
     #[test]
     fn tiles_that_overlap_are_parted() {
         let (mut regroup, mut from) = (Regroup::default(), tiles(true));
@@ -267,7 +283,7 @@ mod tests {
         assert_eq!(before, after);
         let mut points = Points::default();
         points.take(sorted, |rays| rays.dir);
-        assert!(!points.overlap());
+        assert!(!points.overlap(SPREAD));
     }
 
     #[test]
