@@ -10,7 +10,7 @@ use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use rayon::prelude::*;
 
 use super::Tree;
-use super::node::{Child, Leaf, Node};
+use super::node::{Child, Content, Leaf, Node};
 use crate::lanes::LANES;
 use crate::plan::{Kind, Parts, Plan, Skip};
 use crate::scene::Visible;
@@ -87,8 +87,21 @@ impl Tree {
         };
         let loose = Kind::ALL.into_iter().zip(counts).flat_map(leaves).collect();
         let culls = stores.hide_any();
-        Tree { stores, nodes, room: LANES * depth, loose, loose_boxes: Vec::new(), culls, size, one_by_one: false }
+        let (grain, room) = (grain(&nodes), LANES * depth);
+        Tree { stores, nodes, room, loose, loose_boxes: Vec::new(), culls, size, grain, one_by_one: false }
     }
+}
+
+/// The median of the longest edges of the boxes of leaves.
+fn grain(nodes: &[Node]) -> f32 {
+    let edge = |(_, min, max): (usize, Vec3, Vec3)| (max - min).max_element();
+    let leaves = |node: &Node| -> Vec<f32> {
+        let is_leaf = |(slot, ..): &(usize, Vec3, Vec3)| matches!(node.child(*slot).content(), Content::Leaf(_));
+        node.boxes().filter(is_leaf).map(edge).collect()
+    };
+    let mut edges: Vec<f32> = nodes.iter().flat_map(leaves).collect();
+    let middle = edges.len() / 2;
+    if edges.is_empty() { 0.0 } else { *edges.select_nth_unstable_by(middle, f32::total_cmp).1 }
 }
 
 fn count(parts: &Parts, kind: Kind) -> usize {

@@ -3,6 +3,7 @@
 //! One 8-wide tree serves two kinds of walk. Coherent rays go down as a tile of eight packets, first
 //! all of them against eight boxes, then a lane a packet; in a leaf a lane is a ray. Incoherent rays go
 //! down as a stream, each for itself, a lane a box, and in a leaf a lane is a primitive.
+//! Shadow rays whose packets overlap are put into other tiles first, where they are close together.
 
 mod build;
 mod bundle;
@@ -40,6 +41,7 @@ pub struct Tree {
     loose_boxes: Vec<[Vec3; 2]>, // bounds of what is loose, planes apart
     culls: bool,                 // some row hides a side
     size: f32,                   // longest edge of the bounds, scene units
+    grain: f32,                  // the same of the boxes of leaves, their median
     one_by_one: bool,            // no tiles
 }
 

@@ -168,7 +168,10 @@ impl Tree {
         let mut regroup = std::mem::take(&mut walk.regroup);
         for tiles in tiles.chunks_mut(Regroup::MOST) {
             let is_worth_it = !self.one_by_one && self.nodes.len() > TINY;
-            match Some(tiles as &[Tile]).filter(|_| is_worth_it).and_then(|tiles| regroup.sort(tiles, self.size)) {
+            match Some(tiles as &[Tile])
+                .filter(|_| is_worth_it)
+                .and_then(|tiles| regroup.sort(tiles, self.size, self.grain))
+            {
                 Some(sorted) => {
                     self.walk_tiles::<true, false>(sorted, walk);
                     regroup.hand_back(tiles);
