@@ -65,7 +65,7 @@ impl Direct<'_> {
             );
         }
         if let (true, RayKind::Camera, Some(exact)) = (self.plan.specks, wave.kind, before) {
-            stores.sharpen_spheres(hit, &wave.tile.hits[p].to_array(), (exact, rays.t_max), &mut surface);
+            stores.sharpen_specks(hit, &wave.tile.hits[p].to_array(), (rays, exact), &mut surface);
         }
         let first = exact.len();
         if self.goes_on() {

@@ -11,6 +11,7 @@ mod valid;
 
 use glam::DVec3;
 
+pub use self::origin::SPECK;
 pub use self::reach::{LEAST_COSINE, Sight};
 pub use self::skips::{LeftOut, Skip, SkipSet, Skipped, Skips};
 pub use self::valid::{InvalidScene, validate};

@@ -12,7 +12,7 @@ use crate::scene::{Camera, Lens, Scene, Shape, bounding_balls};
 /// A pixel that covers less than this share of the distance is seen through a long lens: some thousand roundings.
 const NARROW: f64 = 1e-4;
 /// A sphere is a speck where the eye is so many times its radius away: f32 rounds its normals by as many roundings.
-const SPECK: f64 = 128.0;
+pub const SPECK: f64 = 128.0;
 /// A scene is far where the eye is away from its middle so many times its radius.
 const FAR: f64 = 8.0;
 

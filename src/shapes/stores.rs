@@ -3,9 +3,10 @@
 use glam::{DVec2, DVec3};
 
 use super::{Part, Ray64, Store, Surface8, Surface64, noise};
-use crate::lanes::{Columns, ExactPacket, Float8, LANES, Mask8, RayPacket, Vec3x8, bits};
+use crate::lanes::{Columns, ExactPacket, Float8, LANES, Mask8, RayPacket, Vec3x8, bits, float8};
 use crate::plan::{
-    BoxPart, ConePart, CylinderPart, DiskPart, Kind, Owner, Parts, PlanePart, PolygonPart, SpherePart, TurnedBoxPart,
+    BoxPart, ConePart, CylinderPart, DiskPart, Kind, Owner, Parts, PlanePart, PolygonPart, SPECK, SpherePart,
+    TurnedBoxPart,
 };
 use crate::scene::Visible;
 
@@ -191,25 +192,31 @@ impl Stores {
         }
     }
 
-    /// Takes the normals of those lanes of a surface that met spheres from f64, of rays before they were rounded.
+    /// Takes the normals of those lanes of a surface that met spheres which are specks from there from f64, of rays
+    /// before they were rounded.
     #[inline(never)]
-    pub fn sharpen_spheres(
+    pub fn sharpen_specks(
         &self,
         lanes: u32,
         hits: &[f32; LANES],
-        (exact, t): (&ExactPacket, Float8),
+        (rays, exact): (&RayPacket, &ExactPacket),
         surface: &mut Surface8,
     ) {
-        let (mut parts, mut spheres) = ([None; LANES], 0);
+        let (t, mut radius) = (rays.t_max, [f32::INFINITY; LANES]);
         for lane in bits(lanes) {
             let row = RowRef::from_lane(hits[lane]);
             if row.kind() == Some(Kind::Sphere) {
-                (parts[lane], spheres) = (self.spheres.part(row.row()), spheres | 1 << lane);
+                radius[lane] = self.spheres.block(row.row() / LANES).1.as_array()[row.row() % LANES];
             }
         }
-        if spheres != 0 {
+        let specks = Mask8::gt(t * rays.dir.length(), Float8::from(radius) * float8(SPECK as f32));
+        if specks.any() {
+            let mut parts = [None; LANES];
+            for lane in specks.lanes() {
+                parts[lane] = self.spheres.part(RowRef::from_lane(hits[lane]).row());
+            }
             let normal = super::sphere::exact_normals(&parts, exact, t.as_array());
-            surface.normal = Vec3x8::select(Mask8::from_bits(spheres), normal, surface.normal);
+            surface.normal = Vec3x8::select(specks, normal, surface.normal);
         }
     }
 
