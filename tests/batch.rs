@@ -65,6 +65,18 @@ fn one_scene_that_fails_does_not_stop_the_others() {
     assert!(err.contains("would be the picture of two jobs, 1 and 2"), "{err}");
 }
 
+/// The picture counts with all of its layers, whoever says how large it is.
+#[test]
+fn more_memory_than_allowed_is_refused() {
+    let room = Room::new();
+    let ask = "render scene.toml -o one.exr --spp 1 -q --resolution 1000x1000";
+    room.run(&format!("{ask} --max-memory 60M")).success();
+    for words in [" --max-memory 20M", " --max-memory 60M --aov all"] {
+        let (_, err) = room.texts(&format!("{ask}{words}"), 5);
+        assert!(err.contains("MiB of memory are needed, and the limit is"), "{words}: {err}");
+    }
+}
+
 #[test]
 fn shards_share_out_the_frames() {
     let room = Room::new();

@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 
 use super::checkpoint::{Checkpoint, Saves};
-use super::memory::{self, forecast};
+use super::memory;
 use super::source::{Shared, Ticket};
 use super::write::{Finished, Room, Writer, line};
 use super::{Event, Job, JobError, Report, Shard, Sources, Watch, annotate, existing, ledger};
@@ -28,9 +28,6 @@ use crate::scene::{Aov, Scene};
 
 /// Samples of a picture that is worth all threads: some tenths of a second.
 const LARGE: u64 = 1 << 22;
-/// Bytes that a pixel takes at the most: in its block and in the picture, or in the picture and as a file (measured,
-/// rounded up).
-const PIXEL_BYTES: u64 = 40;
 
 /// How a batch is run.
 #[derive(Debug, Clone, Default)]
@@ -199,7 +196,7 @@ impl Batch<'_> {
         let bytes = match self.options.max_memory {
             None => 0,
             Some(limit) => {
-                let bytes = forecast(&job.scene, job.frame());
+                let bytes = memory::forecast(&job.scene, job.frame());
                 if queue.open > 0 && queue.bytes.saturating_add(bytes) > limit {
                     return Turn::Help;
                 }
@@ -299,7 +296,7 @@ impl Batch<'_> {
         if self.options.resume && existing::is_current(job, &renderer, &scene_hash) {
             return Ok(None);
         }
-        self.room(scene, &renderer)?;
+        self.room(job, scene, &renderer)?;
         let task = Task::new(&renderer).map_err(failed)?;
         let (start, total) = (Instant::now(), task.total());
         self.large.fetch_add(total, Ordering::Relaxed);
@@ -374,8 +371,7 @@ impl Batch<'_> {
     fn allow(&self, job: &Job) -> Result<(), JobError> {
         let Some(limit) = self.options.max_memory else { return Ok(()) };
         let pixels = job.settings.resolution.map_or(0, |(width, height)| u64::from(width) * u64::from(height));
-        let need = forecast(&job.scene, job.frame()).saturating_add(PIXEL_BYTES * pixels);
-        let mib = |bytes: u64| bytes.div_ceil(1 << 20);
+        let need = memory::forecast(&job.scene, job.frame()).saturating_add(memory::of_pixels(pixels, 0));
         if need <= limit {
             // Once a scene file, before it is read.
             if lock(&self.forecast).insert(job.scene.clone()) {
@@ -383,23 +379,20 @@ impl Batch<'_> {
             }
             return Ok(());
         }
-        let scene = job.scene.display();
-        Err(JobError::Memory(format!(
-            "{scene}: about {} MiB of memory are needed, and the limit is {} MiB",
-            mib(need),
-            mib(limit)
-        )))
+        Err(too_much(job, need, limit))
     }
 
     /// Makes sure that there is room for the tree and the picture, now that both are known.
-    fn room(&self, scene: &Scene, renderer: &Renderer<'_>) -> Result<(), JobError> {
+    fn room(&self, job: &Job, scene: &Scene, renderer: &Renderer<'_>) -> Result<(), JobError> {
         let window = renderer.window().map_err(|error| JobError::Render { path: Default::default(), error })?;
         let work = format!("a picture of {}x{} pixels", window.width(), window.height());
-        let pixels = PIXEL_BYTES.saturating_mul(window.area() as u64);
+        let pixels = memory::of_pixels(window.area() as u64, renderer.channel_count());
         let moments = renderer.moment_count() as u64;
-        self.watch
-            .room(memory::to_build(scene).saturating_mul(moments).saturating_add(pixels), &work)
-            .map_err(JobError::Memory)
+        let need = memory::to_build(scene).saturating_mul(moments).saturating_add(pixels);
+        match self.options.max_memory {
+            Some(limit) if need > limit => Err(too_much(job, need, limit)),
+            _ => self.watch.room(need, &work).map_err(JobError::Memory),
+        }
     }
 
     /// A hash over all files that the scene of a job names.
@@ -458,6 +451,15 @@ impl Batch<'_> {
         let all = (done as f64 / 1e6 / self.jobs.len() as f64).min(1.0);
         self.watch.event(&Event::Progress(all, index, &self.jobs[index]));
     }
+}
+
+fn mib(bytes: u64) -> u64 {
+    bytes.div_ceil(1 << 20)
+}
+
+fn too_much(job: &Job, need: u64, limit: u64) -> JobError {
+    let (scene, need, limit) = (job.scene.display(), mib(need), mib(limit));
+    JobError::Memory(format!("{scene}: about {need} MiB of memory are needed, and the limit is {limit} MiB"))
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::adaptive::Noise;
 use super::block::Block;
+use super::layers::channel_count;
 use super::{Engine, IdNames, Progress, RenderError, Stats, Task};
 use crate::film::{Picture, Window};
 use crate::output::{self, Description, Losses, Options, OutputError};
@@ -239,6 +240,11 @@ impl<'s> Renderer<'s> {
     /// The layers in force.
     pub fn aovs(&self) -> Layers {
         self.layers
+    }
+
+    /// How many channels the layers in force have.
+    pub fn channel_count(&self) -> usize {
+        channel_count(self.layers)
     }
 
     /// The camera in force.

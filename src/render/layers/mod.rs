@@ -123,35 +123,6 @@ impl<'s> LayerPlan<'s> {
         }
     }
 
-    /// Channels in the order of their samples in a block.
-    fn channels(&self) -> Vec<(String, Kind)> {
-        self.layers.iter().flat_map(|aov| self.channels_of(aov)).collect()
-    }
-
-    fn channels_of(&self, aov: Aov) -> Vec<(String, Kind)> {
-        let some = |layer: &str, suffixes: &str, kind| -> Vec<(String, Kind)> {
-            suffixes.chars().map(|suffix| (format!("{layer}.{suffix}"), kind)).collect()
-        };
-        let named = |names: &[&str], kind| names.iter().map(|name| ((*name).to_owned(), kind)).collect();
-        match aov {
-            Aov::Depth => some("depth", "Z", Kind::Float),
-            Aov::Position => some("P", "XYZ", Kind::Float),
-            Aov::Normal => some("N", "XYZ", Kind::Half),
-            Aov::Albedo => some("albedo", "RGB", Kind::Half),
-            Aov::Uv => some("uv", "UV", Kind::Float),
-            Aov::Motion => some("forward", "uv", Kind::Float),
-            Aov::Ids => named(&["id.object", "id.material"], Kind::Uint),
-            Aov::Samples => some("samples", "Y", Kind::Float),
-            Aov::Variance => some("variance", "RGB", Kind::Float),
-            Aov::Margin => some("margin", "Y", Kind::Float),
-            Aov::Cost => named(&["cost.box", "cost.prim", "cost.lanes"], Kind::Float),
-            Aov::CryptoObject | Aov::CryptoMaterial | Aov::CryptoGroup => {
-                let layers = 0..self.layers.ranks / 2;
-                layers.flat_map(|layer| some(&format!("{}{layer:02}", aov.name()), "RGBA", Kind::Float)).collect()
-            }
-        }
-    }
-
     /// Puts the channels into a picture, all 0.
     pub fn open(&self, picture: &mut Picture) {
         let area = picture.window.area();
@@ -163,14 +134,14 @@ impl<'s> LayerPlan<'s> {
             };
             Channel { name, samples }
         };
-        picture.channels = self.channels().into_iter().map(blank).collect();
+        picture.channels = channels(self.layers).into_iter().map(blank).collect();
     }
 
     /// Puts what a noise level took in the place of what is known of its first samples alone.
     pub fn tell_effort(&self, effort: &Effort, work: &mut LayerWork) {
         let mut channels = &mut work.channels[..];
         for aov in self.layers.iter() {
-            let (own, rest) = take(&mut channels).split_at_mut(self.channels_of(aov).len());
+            let (own, rest) = take(&mut channels).split_at_mut(channels_of(self.layers, aov).len());
             for (part, samples) in own.iter_mut().enumerate() {
                 match aov {
                     Aov::Samples => {
@@ -220,6 +191,40 @@ impl<'s> LayerPlan<'s> {
             numbers(channel).into_iter().map(|number| (number, self.name(aov, number - 1))).collect()
         };
         IdNames { object: named("id.object", Aov::CryptoObject), material: named("id.material", Aov::CryptoMaterial) }
+    }
+}
+
+/// How many channels some layers have.
+pub(super) fn channel_count(layers: Layers) -> usize {
+    channels(layers).len()
+}
+
+/// Channels in the order of their samples in a block.
+fn channels(layers: Layers) -> Vec<(String, Kind)> {
+    layers.iter().flat_map(|aov| channels_of(layers, aov)).collect()
+}
+
+fn channels_of(layers: Layers, aov: Aov) -> Vec<(String, Kind)> {
+    let some = |layer: &str, suffixes: &str, kind| -> Vec<(String, Kind)> {
+        suffixes.chars().map(|suffix| (format!("{layer}.{suffix}"), kind)).collect()
+    };
+    let named = |names: &[&str], kind| names.iter().map(|name| ((*name).to_owned(), kind)).collect();
+    match aov {
+        Aov::Depth => some("depth", "Z", Kind::Float),
+        Aov::Position => some("P", "XYZ", Kind::Float),
+        Aov::Normal => some("N", "XYZ", Kind::Half),
+        Aov::Albedo => some("albedo", "RGB", Kind::Half),
+        Aov::Uv => some("uv", "UV", Kind::Float),
+        Aov::Motion => some("forward", "uv", Kind::Float),
+        Aov::Ids => named(&["id.object", "id.material"], Kind::Uint),
+        Aov::Samples => some("samples", "Y", Kind::Float),
+        Aov::Variance => some("variance", "RGB", Kind::Float),
+        Aov::Margin => some("margin", "Y", Kind::Float),
+        Aov::Cost => named(&["cost.box", "cost.prim", "cost.lanes"], Kind::Float),
+        Aov::CryptoObject | Aov::CryptoMaterial | Aov::CryptoGroup => {
+            let parts = 0..layers.ranks / 2;
+            parts.flat_map(|part| some(&format!("{}{part:02}", aov.name()), "RGBA", Kind::Float)).collect()
+        }
     }
 }
 
