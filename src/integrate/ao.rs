@@ -49,7 +49,7 @@ impl Direct<'_> {
             tile.packets[p] = RayPacket::new(origin, dir, t_max, live);
             tile.own[p] = own(wave.tile.hits[p], shaded.front);
         }
-        (given.cast, given.tile) = (given.lit, place);
+        (given.cast, given.tile) = (given.lit, Some(place));
         sink.shadows.add(given);
     }
 }

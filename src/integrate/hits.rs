@@ -55,17 +55,13 @@ impl Direct<'_> {
         let before = wave.tile.exact.as_ref().map(|exact| &exact[p]);
         let (mut surface, owners) = stores.surface::<false>(wave.tile.hits[p], rays, rays.t_max, before);
         let owners = &owners;
-        if self.plan.sharp && wave.kind == RayKind::Camera {
-            stores.sharpen(
-                Mask8::from_bits(hit),
-                &wave.tile.hits[p].to_array(),
-                (rays, rays.t_max),
-                before,
-                &mut surface,
-            );
-        }
-        if let (true, RayKind::Camera, Some(exact)) = (self.plan.specks, wave.kind, before) {
-            stores.sharpen_specks(hit, &wave.tile.hits[p].to_array(), (rays, exact), &mut surface);
+        if wave.kind == RayKind::Camera {
+            let hits = wave.tile.hits[p].to_array();
+            if self.plan.sharp {
+                stores.sharpen(Mask8::from_bits(hit), &hits, (rays, rays.t_max), before, &mut surface);
+            } else if let (true, Some(exact)) = (self.plan.specks, before) {
+                stores.sharpen_specks(hit, &hits, (rays, exact), &mut surface);
+            }
         }
         let first = exact.len();
         if self.goes_on() {

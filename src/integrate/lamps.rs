@@ -139,7 +139,7 @@ impl Direct<'_> {
                 sink.left_out[Skip::Shadows] += u64::from((shaded.hit & !given.cast[p]).count_ones());
                 tile.packets[p] = shaded.rays_to(&drawn, Mask8::from_bits(given.cast[p]));
                 tile.own[p] = own(wave.tile.hits[p], shaded.front);
-                given.tile = *place;
+                given.tile = Some(*place);
             }
         }
         sink.shadows.add(given);

@@ -76,7 +76,7 @@ fn cast_shadows<R: Record>(light: &Illumination, wave: &Wave, hits: Hits, share:
         tile.packets[p] = hits.0[p].shadow_rays(light, Mask8::from_bits(share.cast[p]));
         tile.own[p] = own(wave.tile.hits[p], hits.0[p].front);
     }
-    share.tile = place;
+    share.tile = Some(place);
 }
 
 /// Casts no rays from the fronts of primitives that nothing can put in the shadow of this light: from the inside of

@@ -77,7 +77,7 @@ impl Shadows {
     }
 
     /// Dead rays to be set, which are traced for a light, and their place.
-    pub fn tile(&mut self, light: usize, common: Option<[f32; 3]>) -> (&mut Tile, Option<usize>) {
+    pub fn tile(&mut self, light: usize, common: Option<[f32; 3]>) -> (&mut Tile, usize) {
         if self.tiles.len() <= light {
             self.tiles.resize_with(light + 1, Tiles::default);
         }
@@ -89,7 +89,7 @@ impl Shadows {
         tile.renew(common);
         tile.packets.fill(RayPacket::dead());
         *used += 1;
-        (tile, Some(*used - 1))
+        (tile, *used - 1)
     }
 
     /// Adds up what is left of the light where its rays are known.

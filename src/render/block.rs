@@ -122,19 +122,16 @@ impl Block {
         stop: impl Fn() -> bool,
     ) -> Option<BlockWork> {
         let (mut sums, share) = (vec![[0.0; 4]; self.window.area()], 1.0 / range.len() as f64);
-        let mut work = self.add(&mut sums, self.window, view, direct, range, record, stop)?;
+        let mut work = self.add((&mut sums, self.window), (view, direct), range, record, stop)?;
         work.pixels = sums.into_iter().map(|sum| sum.map(|x| (x * share) as f32)).collect();
         Some(work)
     }
 
     /// The same, added to the sums of a frame around it; without means.
-    #[allow(clippy::too_many_arguments)]
     fn add<R: Record>(
         &self,
-        sums: &mut [[f64; 4]],
-        frame: Window,
-        view: &View,
-        direct: &Direct,
+        (sums, frame): (&mut [[f64; 4]], Window),
+        (view, direct): (&View, &Direct),
         range: Range<u32>,
         record: &mut R,
         stop: impl Fn() -> bool,
@@ -185,11 +182,15 @@ impl Block {
         Some(BlockWork { pixels, layers: None, rays, tests, left_out, tiles, background_tiles, effort: None })
     }
 
+    /// Where the rows of this part of a whole square are among its pixels.
+    fn rows_in(&self, whole: &Block) -> Vec<Range<usize>> {
+        let row = |y| whole.window.index(self.window.x0, y).map(|start| start..start + self.window.width());
+        (self.window.y0..self.window.y1).filter_map(row).collect()
+    }
+
     /// Those of the pixels of a whole square that lie in this part of it.
     pub fn part<T: Copy>(&self, whole: &Block, pixels: &[T]) -> Vec<T> {
-        let row = |y| whole.window.index(self.window.x0, y).map(|start| start..start + self.window.width());
-        let rows = (self.window.y0..self.window.y1).filter_map(row);
-        rows.flat_map(|row| &pixels[row]).copied().collect()
+        self.rows_in(whole).into_iter().flat_map(|row| &pixels[row]).copied().collect()
     }
 
     /// The square that it is a part of, sampled until it is good enough, while a record looks on; all is of that square.
@@ -205,7 +206,7 @@ impl Block {
         let (cells, pixels) = whole.cells();
         let mut all: Option<BlockWork> = None;
         let draw = |cell: usize, sums: &mut Sums, range: Range<u32>| {
-            let work = cells[cell].add(sums, whole.window, view, direct, range, record, stop)?;
+            let work = cells[cell].add((sums, whole.window), (view, direct), range, record, stop)?;
             match &mut all {
                 None => all = Some(work),
                 Some(all) => all.absorb(&work),
@@ -218,10 +219,9 @@ impl Block {
 
     /// The part of a block's pixels and layers that lies in this one.
     pub fn cut(&self, whole: &Block, work: &mut BlockWork) {
-        let row = |y| whole.window.index(self.window.x0, y).map(|start| start..start + self.window.width());
-        let rows: Vec<_> = (self.window.y0..self.window.y1).filter_map(row).collect();
-        work.pixels = rows.iter().flat_map(|row| &work.pixels[row.clone()]).copied().collect();
+        work.pixels = self.part(whole, &work.pixels);
         if let Some(layers) = &mut work.layers {
+            let rows = self.rows_in(whole);
             layers.channels.iter_mut().for_each(|samples| *samples = samples.rows(&rows));
         }
     }
