@@ -293,7 +293,7 @@ fn a_picture_that_does_not_fit_into_memory_ends_with_5() {
     let output = Command::new("sh").args(["-c", script]).arg(binary()).current_dir(room.path(".")).output().unwrap();
     let err = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(5), "{err}");
-    assert!(err.contains("a picture of 20000x20000 pixels needs about 15 GiB of memory, and "), "{err}");
+    assert!(err.contains("a picture of 20000x20000 pixels needs about 10 GiB of memory, and "), "{err}");
     assert!(room.outputs().is_empty());
 }
 
