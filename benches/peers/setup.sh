@@ -13,7 +13,7 @@ fi
 "$W/venv/bin/python" -c 'import mitsuba' 2>/dev/null || "$W/venv/bin/pip" install -q mitsuba==3.9.1 || true
 # Embree 4 comes bundled in this wheel.
 ls "$W"/venv/lib/python3*/site-packages/embreex.libs/libembree4* >/dev/null 2>&1 || "$W/venv/bin/pip" install -q embreex || true
-if [ -e /usr/include/embree3/rtcore.h ] && [ "$HERE/embree_bench.cpp" -nt "$W/embree_bench" ]; then
+if [ -e /usr/include/embree3/rtcore.h ] && { [ ! -e "$W/embree_bench" ] || [ "$HERE/embree_bench.cpp" -nt "$W/embree_bench" ]; }; then
   g++ -O3 -march=native -std=c++17 -o "$W/embree_bench" "$HERE/embree_bench.cpp" -ldl -lpthread
 fi
 for s in fig5 flake million polys discs mixed; do
