@@ -1,6 +1,7 @@
 //! A node of the tree: eight boxes, and the test of eight boxes or eight packets at once.
 
 use glam::Vec3;
+use prefetch_index::prefetch_index;
 
 use crate::lanes::{Columns, Float8, LANES, Mask8, UNIT_ROUNDOFF, Vec3x8, float8};
 use crate::plan::Kind;
@@ -94,6 +95,12 @@ impl Node {
     #[inline(always)]
     pub fn child(&self, slot: usize) -> Child {
         Child(self.columns[CHILDREN].as_array()[slot % LANES].to_bits())
+    }
+
+    /// Asks for all of it to be brought near.
+    #[inline(always)]
+    pub fn fetch(&self) {
+        (0..self.columns.len()).step_by(2).for_each(|column| prefetch_index(&self.columns, column));
     }
 
     /// The leaves among its children.

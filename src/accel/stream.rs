@@ -156,6 +156,15 @@ impl Tree {
         }
     }
 
+    /// Asks for a child to be brought near before it is looked at.
+    #[inline(always)]
+    fn fetch(&self, child: Child) {
+        match child.content() {
+            Content::Node(index) => self.nodes[index].fetch(),
+            Content::Leaf(leaf) => self.stores.fetch(leaf.kind, leaf.block),
+        }
+    }
+
     /// Takes the first `count` rays of the room down.
     fn descend_octant<const ANY: bool, const CULL: bool>(
         &self,
@@ -181,7 +190,11 @@ impl Tree {
                     let node = &self.nodes[index];
                     counts.boxes += u64::from(count) * LANES as u64;
                     let (order, met) = octant.meets(node, &rays[range.clone()], &mut slots[range], lines);
-                    let child = |slot| Todo { child: node.child(slot), slot: slot as u32, first, count };
+                    let child = |slot| {
+                        let child = node.child(slot);
+                        self.fetch(child);
+                        Todo { child, slot: slot as u32, first, count }
+                    };
                     todo.nearest_first::<ANY>(&order, met, child)
                 }
             };

@@ -1,6 +1,7 @@
 //! All parts of one kind: a structure of arrays in blocks of eight rows, so that a leaf of the tree lies in
 //! neighbouring cache lines.
 
+use prefetch_index::prefetch_index;
 use rayon::prelude::*;
 
 use super::Part;
@@ -87,6 +88,12 @@ impl<P: Part> Store<P> {
     #[inline(always)]
     pub fn block(&self, block: usize) -> &P::Rows {
         &self.blocks[block].0
+    }
+
+    /// Asks for the first rows of a block to be brought near.
+    #[inline(always)]
+    pub fn fetch(&self, block: usize) {
+        prefetch_index(&self.blocks, block);
     }
 
     /// A row in all lanes.

@@ -77,6 +77,12 @@ impl Stores {
         self.certify = certify;
     }
 
+    /// Asks for the first rows of a block to be brought near.
+    #[inline(always)]
+    pub fn fetch(&self, kind: Kind, block: usize) {
+        self.visit(kind, Fetch(block));
+    }
+
     /// Sends a visitor to the store of a kind.
     #[inline(always)]
     pub fn visit<V: Visit>(&self, kind: Kind, visitor: V) -> V::Output {
@@ -332,6 +338,16 @@ impl Visit for Blocks {
     type Output = usize;
     fn visit<P: Part>(self, store: &Store<P>) -> usize {
         store.blocks()
+    }
+}
+
+struct Fetch(usize);
+
+impl Visit for Fetch {
+    type Output = ();
+    #[inline(always)]
+    fn visit<P: Part>(self, store: &Store<P>) {
+        store.fetch(self.0);
     }
 }
 
