@@ -72,6 +72,11 @@ impl CameraRays {
         self.common
     }
 
+    /// Whether samples are spread over the picture, and not all at the centres of pixels.
+    pub fn spreads(&self) -> bool {
+        self.filter.is_some()
+    }
+
     /// Whether the rays of a pixel depend on its sample pattern.
     pub fn draws(&self) -> bool {
         self.filter.is_some() || matches!(self.optics, Optics::Lens(..))

@@ -1,6 +1,8 @@
 //! Eight f32, and sums of products that do not cancel.
 
-use wide::{f32x4, f32x8};
+use wide::{f32x4, f32x8, f64x4};
+
+use super::LANES;
 
 /// Eight lanes of f32.
 pub type Float8 = f32x8;
@@ -19,6 +21,17 @@ pub fn least(x: Float8) -> f32 {
     let [a, b, c, d] = half.to_array();
     let min = |a: f32, b: f32| if a < b { a } else { b };
     min(min(a, b), min(c, d))
+}
+
+/// The first lane of the least of eight f64, none of them NaN, and that: without branches, which nobody could foretell.
+#[inline]
+pub fn first_least(values: &[f64; LANES]) -> (usize, f64) {
+    let [low, high] = [0, 4].map(|first| f64x4::new(std::array::from_fn(|i| values[first + i])));
+    let [a, b, c, d] = low.fast_min(high).to_array();
+    let min = |a: f64, b: f64| if a < b { a } else { b };
+    let least = min(min(a, c), min(b, d));
+    let lanes = [low, high].map(|four| four.simd_eq(f64x4::splat(least)).to_bitmask());
+    ((lanes[0] | lanes[1] << 4).trailing_zeros() as usize % LANES, least)
 }
 
 /// The greatest of the lanes.
@@ -51,6 +64,13 @@ fn by_lane(values: [Float8; 4], f: impl Fn([f64; 4]) -> f64) -> Float8 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_first_of_equals_is_the_least() {
+        assert_eq!(first_least(&[5.0, 3.0, 7.0, 3.0, 9.0, 4.0, 3.0, 8.0]), (1, 3.0));
+        assert_eq!(first_least(&[5.0, 3.0, 7.0, 3.0, 9.0, 0.5, 3.0, 8.0]), (5, 0.5));
+        assert_eq!(first_least(&[0.0; LANES]), (0, 0.0));
+    }
 
     #[test]
     fn products_that_cancel_keep_their_difference() {

@@ -11,7 +11,7 @@ mod ray;
 mod vec3;
 
 pub use column::Columns;
-pub use float::{Float8, difference_of_products, float8, greatest, least};
+pub use float::{Float8, difference_of_products, first_least, float8, greatest, least};
 pub use mask::{Mask8, bits};
 pub use packet::{ExactPacket, Hit8, RayPacket};
 pub use ray::Ray;

@@ -367,7 +367,8 @@ impl Batch {
         let count = |p: usize| all.saturating_sub(p * LANES).min(LANES);
         for (p, samples) in self.samples.iter().enumerate() {
             let points = rays.points(samples);
-            if R::SURFACES {
+            // Others are the centres themselves.
+            if R::SURFACES && rays.spreads() {
                 self.distances[p] = samples.distances(&points);
             }
             let exact = &mut wave.tile.exact_mut()[p];

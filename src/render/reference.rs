@@ -103,8 +103,7 @@ fn add_layers(plan: &LayerPlan, sums: &mut Sums, index: usize, pixel: &Pixel) {
         }
         let Some(first) = &seen.first else { continue };
         let (primitive, material) = (first.primitive as u32, first.material as u32);
-        sums.normal.add(index, first.normal);
-        sums.albedo.add(index, first.albedo);
+        sums.filtered.add(index, first.normal, first.albedo);
         if sums.want_mattes() {
             sums.add_to_mattes(plan, index, primitive, material);
         }
@@ -112,7 +111,7 @@ fn add_layers(plan: &LayerPlan, sums: &mut Sums, index: usize, pixel: &Pixel) {
             // A row of no store: any that is no miss will do.
             let row = RowRef::new(Kind::Sphere, 0);
             let near = Near { t: 0.0, row, primitive, material, sample: sample as u32 };
-            sums.nearest().see(index, near, first.depth as f32, |primitive| plan.objects.of(primitive));
+            sums.nearest().see(index, near, first.depth as f32, plan.objects.of(primitive));
         }
     }
 }

@@ -33,11 +33,28 @@ impl Objects {
     #[inline]
     pub fn of(&self, primitive: u32) -> u32 {
         match primitive.checked_sub(self.singles) {
-            // A single cloud need not be looked for.
-            Some(_) if !self.instances && self.starts.len() == 2 => self.singles,
             Some(_) if !self.instances => self.singles + self.cloud(primitive),
             _ => primitive,
         }
+    }
+
+    /// The objects of some primitives.
+    #[inline(always)]
+    pub fn of_all<const N: usize>(&self, primitives: [u32; N]) -> [u32; N] {
+        if self.instances {
+            return primitives;
+        }
+        let (mut objects, singles) = (primitives, self.singles);
+        if self.starts.len() > 16 {
+            (0..N).for_each(|i| objects[i] = self.of(primitives[i]));
+            return objects;
+        }
+        // Few clouds are sooner counted than looked for.
+        (0..N).for_each(|i| objects[i] = primitives[i].min(singles));
+        for &start in &self.starts[1..] {
+            (0..N).for_each(|i| objects[i] += u32::from(start <= primitives[i]));
+        }
+        objects
     }
 
     /// The cloud that a primitive past the single shapes is a row of.
@@ -113,6 +130,7 @@ mod tests {
         let clouds = ["cloud 0"; 3].into_iter().chain(["dust"; 3]);
         assert_eq!(names(&grouped), ["sphere 0", "ball"].into_iter().chain(clouds).collect::<Vec<_>>());
         let rows = ["cloud 0:0", "cloud 0:1", "cloud 0:2", "dust:0", "dust:1", "dust:2"];
+        assert_eq!(grouped.of_all([0, 1, 2, 3, 4, 5, 6, 7]), [0, 1, 2, 2, 2, 3, 3, 3]);
         assert_eq!(names(&each), ["sphere 0", "ball"].into_iter().chain(rows).collect::<Vec<_>>());
         let groups: Vec<u32> = (0..8).map(|primitive| each.group(&scene, primitive)).collect();
         assert_eq!(groups, [0, 1, 0, 0, 0, 1, 1, 1]);

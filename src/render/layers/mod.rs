@@ -3,10 +3,12 @@
 //! | file | what it says |
 //! |---|---|
 //! | `sums` | a block's layers in the making, sample by sample, and as channels |
+//! | `filtered` | normals and albedos, and their means |
 //! | `near` | the sample nearest to a pixel's centre, and the variance of a mean |
 //! | `matte` | ids and their coverage |
 //! | `tape` | how the engine's tiles get there |
 
+mod filtered;
 mod matte;
 mod near;
 mod sums;

@@ -1,7 +1,7 @@
 //! What a pixel keeps: the sample nearest to its centre, and batches of samples for the variance of its mean.
 
 use super::sums::Places;
-use crate::lanes::LANES;
+use crate::lanes::{LANES, first_least};
 use crate::scene::{Aov, Layers};
 use crate::shapes::RowRef;
 
@@ -56,81 +56,78 @@ impl Nearest {
     }
 
     /// Of some samples of a packet, counted from lane 0, those that are the nearest of their pixels so far, the first of
-    /// equals. Until more is said of them they see nothing.
-    pub fn choose(&mut self, (pixels, index): Lanes, distances: &[f64; LANES], count: usize) -> u32 {
+    /// equals; `one` says that all lanes are of one pixel. Until more is said of them they see nothing.
+    #[inline]
+    pub fn choose(&mut self, (pixels, one): (&[u32; LANES], bool), distances: &[f64; LANES], count: usize) -> u32 {
         if self.distances.is_empty() {
             return if self.is_asked { (1 << count) - 1 } else { 0 };
         }
-        if count == LANES && *pixels == [pixels[0]; LANES] {
-            let (best, distance) = least8(distances);
-            return self.choose_if(pixels[0] as usize, (best, distance), index);
+        if one && count == LANES {
+            return self.choose_if(pixels[0] as usize, first_least(distances));
         }
         let (mut chosen, mut i) = (0, 0);
         while i < count {
             let end = i + pixels[i..count].iter().take_while(|pixel| **pixel == pixels[i]).count();
             let least = |a: (usize, f64), b: (usize, f64)| if b.1 < a.1 { b } else { a };
             let best = (i..end).map(|i| (i, distances[i])).fold((i, f64::INFINITY), least);
-            chosen |= self.choose_if(pixels[i] as usize, best, index);
+            chosen |= self.choose_if(pixels[i] as usize, best);
             i = end;
         }
         chosen
     }
 
     /// The lane of a sample, where it is the nearest one so far.
-    fn choose_if(&mut self, pixel: usize, (lane, distance): (usize, f64), index: &[u32; LANES]) -> u32 {
-        let so_far = &mut self.distances[pixel];
-        if distance < *so_far {
-            *so_far = distance;
-            self.clear(pixel, index[lane]);
+    #[inline]
+    fn choose_if(&mut self, pixel: usize, (lane, distance): (usize, f64)) -> u32 {
+        let so_far = std::mem::replace(&mut self.distances[pixel], distance);
+        if distance < so_far {
+            if so_far < f64::INFINITY {
+                self.clear(pixel);
+            }
             return 1 << lane;
         }
+        self.distances[pixel] = so_far;
         0
     }
 
-    fn clear(&mut self, pixel: usize, sample: u32) {
+    fn clear(&mut self, pixel: usize) {
         set(&mut self.depth, pixel, super::MISS_DEPTH);
         set(&mut self.objects, pixel, 0);
         set(&mut self.materials, pixel, 0);
-        set(&mut self.near, pixel, Near { sample, ..Near::NONE });
+        set(&mut self.near, pixel, Near::NONE);
     }
 
-    /// What a sample sees that was chosen; `object` gives the number of the object that a primitive belongs to.
-    pub fn see(&mut self, pixel: usize, near: Near, depth: f32, object: impl FnOnce(u32) -> u32) {
+    /// What a sample sees that was chosen; `object` is the number of the object that was met.
+    #[inline]
+    pub fn see(&mut self, pixel: usize, near: Near, depth: f32, object: u32) {
         set(&mut self.depth, pixel, depth);
-        if let Some(number) = self.objects.get_mut(pixel) {
-            *number = object(near.primitive) + 1;
-        }
+        set(&mut self.objects, pixel, object + 1);
         set(&mut self.materials, pixel, near.material + 1);
         set(&mut self.near, pixel, near);
     }
 
-    /// The same for some samples of a packet, layer by layer.
-    #[inline]
-    pub fn see8(&mut self, places: &Places, near: &[Near; LANES], depth: &[f32; LANES], object: impl Fn(u32) -> u32) {
+    /// The same for some samples of a packet, layer by layer; lanes that do not count may hold anything. `indices` are
+    /// those of objects and materials.
+    #[inline(always)]
+    pub fn see8(
+        &mut self,
+        places: &Places,
+        depth: &[f32; LANES],
+        mut indices: [[u32; LANES]; 2],
+        near: impl Fn(usize) -> Near,
+    ) {
         if !self.depth.is_empty() {
             places.set(&mut self.depth, depth);
         }
         if !self.objects.is_empty() {
-            places.set(&mut self.objects, &near.map(|near| object(near.primitive).wrapping_add(1)));
-            places.set(&mut self.materials, &near.map(|near| near.material.wrapping_add(1)));
+            indices.as_flattened_mut().iter_mut().for_each(|index| *index = index.wrapping_add(1));
+            places.set(&mut self.objects, &indices[0]);
+            places.set(&mut self.materials, &indices[1]);
         }
         if !self.near.is_empty() {
-            places.set(&mut self.near, near);
+            places.set(&mut self.near, &std::array::from_fn(near));
         }
     }
-}
-
-/// Pixels and indices of a packet's samples.
-type Lanes<'a> = (&'a [u32; LANES], &'a [u32; LANES]);
-
-/// The first lane of the least distance, and that: without branches, which nobody could foretell.
-#[inline]
-fn least8(distances: &[f64; LANES]) -> (usize, f64) {
-    let least = |a: f64, b: f64| if b < a { b } else { a };
-    let four: [f64; 4] = std::array::from_fn(|i| least(distances[i], distances[i + 4]));
-    let distance = least(least(four[0], four[2]), least(four[1], four[3]));
-    let lanes = (0..LANES).fold(0u32, |lanes, i| lanes | u32::from(distances[i] == distance) << i);
-    (lanes.trailing_zeros() as usize % LANES, distance)
 }
 
 /// Sets an element, if there is one.

@@ -1,14 +1,15 @@
 //! The layers of a block in the making, and as channels.
 
-use std::mem::{replace, take};
+use std::mem::take;
 
 use glam::{DVec2, DVec3};
 
+use super::filtered::Filtered;
 use super::matte::{Rank, Tally, ranked};
 use super::near::{Batches, Near, Nearest};
 use super::{LayerPlan, MOST_MARGIN};
-use crate::film::{Plane, Samples};
-use crate::lanes::{Float8, LANES, Vec3x8};
+use crate::film::Samples;
+use crate::lanes::{LANES, bits};
 use crate::scene::Aov;
 use crate::shapes::RowRef;
 
@@ -20,25 +21,13 @@ pub(in crate::render) struct Sums {
     spp: u32,
     /// The same where pixels differ.
     took: Vec<u32>,
-    pub normal: Filtered,
-    pub albedo: Filtered,
+    pub filtered: Filtered,
     /// Sums of shares: box tests, primitive tests, live lanes, lanes.
     pub cost: Vec<[f64; 4]>,
     nearest: Nearest,
     batches: Vec<Batches>,
     batch: u32,
     tallies: [Option<Tally>; Aov::CRYPTOMATTES.len()],
-}
-
-/// Three values of each pixel that pass the pixel filter: samples are drawn from it, so all weigh the same.
-#[derive(Debug)]
-pub(in crate::render) enum Filtered {
-    /// No layer needs them.
-    Unasked,
-    /// Of a single sample: the values, by axis.
-    Single([Vec<f32>; 3]),
-    /// Of several: their sums, by axis.
-    Sums([Vec<f64>; 3]),
 }
 
 /// Samples of a packet.
@@ -52,89 +41,13 @@ pub(in crate::render) struct Places<'a> {
     pub whole: bool,
 }
 
-impl Filtered {
-    fn new(asked: bool, pixels: usize, spp: Option<u32>) -> Self {
-        match (asked, spp) {
-            (false, _) => Filtered::Unasked,
-            (true, Some(1)) => Filtered::Single([(); 3].map(|()| vec![0.0; pixels])),
-            (true, _) => Filtered::Sums([(); 3].map(|()| vec![0.0; pixels])),
-        }
-    }
-
-    pub fn is_asked(&self) -> bool {
-        !matches!(self, Filtered::Unasked)
-    }
-
-    /// Adds the values of a packet to their pixels; lanes that do not count have 0.
-    #[inline]
-    pub fn add8(&mut self, values: &Vec3x8, places: &Places) {
-        let axes = [values.x, values.y, values.z].map(Float8::to_array);
-        match self {
-            Filtered::Unasked => {}
-            Filtered::Single(columns) => {
-                columns.iter_mut().zip(&axes).for_each(|(column, axis)| places.set(column, axis))
-            }
-            Filtered::Sums(sums) => sums.iter_mut().zip(&axes).for_each(|(sums, axis)| places.add(sums, axis)),
-        }
-    }
-
-    /// Adds one sample to a pixel.
-    pub fn add(&mut self, pixel: usize, value: DVec3) {
-        match self {
-            Filtered::Unasked => {}
-            Filtered::Single(columns) => {
-                columns.iter_mut().zip(value.to_array()).for_each(|(column, value)| column[pixel] = value as f32);
-            }
-            Filtered::Sums(sums) => {
-                sums.iter_mut().zip(value.to_array()).for_each(|(sums, value)| sums[pixel] += value)
-            }
-        }
-    }
-
-    /// Means of so many samples each.
-    fn means(self, spp: u32, took: &[u32]) -> [Samples; 3] {
-        match self {
-            Filtered::Unasked => [(); 3].map(|()| Samples::Half(Plane::default())),
-            Filtered::Single(columns) => columns.map(|column| Samples::Half(column.into())),
-            Filtered::Sums(sums) if took.is_empty() => {
-                let share = 1.0 / f64::from(spp);
-                sums.map(|sums| Samples::Half(sums.iter().map(|sum| (sum * share) as f32).collect()))
-            }
-            Filtered::Sums(sums) => {
-                let mean = |(sum, spp): (&f64, &u32)| (sum * (1.0 / f64::from(*spp))) as f32;
-                sums.map(|sums| Samples::Half(sums.iter().zip(took).map(mean).collect()))
-            }
-        }
-    }
-}
-
 impl Places<'_> {
-    /// The lanes that count.
-    fn lanes(&self) -> impl Iterator<Item = usize> + use<> {
-        let lanes = self.lanes;
-        (0..LANES).filter(move |i| lanes >> i & 1 == 1)
-    }
-
-    #[inline]
+    #[inline(always)]
     pub fn set<T: Copy>(&self, column: &mut [T], values: &[T; LANES]) {
         if self.lanes == (1 << LANES) - 1 {
-            self.pixels.iter().zip(values).for_each(|(pixel, value)| column[*pixel as usize] = *value);
+            (0..LANES).for_each(|i| column[self.pixels[i] as usize] = values[i]);
         } else {
-            self.lanes().for_each(|i| column[self.pixels[i] as usize] = values[i]);
-        }
-    }
-
-    /// In the order of the lanes, so that it does not matter how samples are spread over packets; in pairs where they
-    /// are always the same.
-    #[inline]
-    fn add(&self, sums: &mut [f64], values: &[f32; LANES]) {
-        if self.whole {
-            let four: [f64; 4] = std::array::from_fn(|i| f64::from(values[i]) + f64::from(values[i + 4]));
-            sums[self.pixels[0] as usize] += (four[0] + four[2]) + (four[1] + four[3]);
-            return;
-        }
-        for (pixel, value) in self.pixels.iter().zip(values) {
-            sums[*pixel as usize] += f64::from(*value);
+            bits(self.lanes).for_each(|i| column[self.pixels[i] as usize] = values[i]);
         }
     }
 }
@@ -158,8 +71,7 @@ impl Sums {
             pixels,
             spp: samples,
             took: Vec::new(),
-            normal: Filtered::new(layers.has(Aov::Normal), pixels, spp),
-            albedo: Filtered::new(layers.has(Aov::Albedo), pixels, spp),
+            filtered: Filtered::new(layers, pixels, spp),
             cost: vec![[0.0; 4]; room(&[Aov::Cost])],
             nearest: Nearest::new(layers, pixels, spp),
             batches: vec![Batches::default(); room(&[Aov::Variance])],
@@ -213,12 +125,14 @@ impl Sums {
         let near = take(&mut self.nearest.near);
         let places = near.iter().enumerate().map(|(pixel, near)| placed(near, || place(pixel, near)));
         let places: Vec<_> = places.collect();
+        let filtered = take(&mut self.filtered);
+        let [mut normal, mut albedo] = filtered.finish(|pixel| self.samples(pixel)).map(Vec::from);
         for aov in plan.layers.iter() {
             match aov {
                 Aov::Depth => work.channels.push(Samples::Float(take(&mut self.nearest.depth).into())),
                 Aov::Position => (0..3).for_each(|k| work.floats(places.iter().map(|place| place.point[k] as f32))),
-                Aov::Normal => work.add_means(&mut self.normal, self.spp, &self.took),
-                Aov::Albedo => work.add_means(&mut self.albedo, self.spp, &self.took),
+                Aov::Normal => work.channels.append(&mut normal),
+                Aov::Albedo => work.channels.append(&mut albedo),
                 Aov::Uv => (0..2).for_each(|k| work.floats(places.iter().map(|place| place.uv[k] as f32))),
                 Aov::Motion => {
                     let moves = near.iter().zip(&places).map(|(near, place)| match near.row {
@@ -270,10 +184,6 @@ impl Sums {
 impl LayerWork {
     fn floats(&mut self, samples: impl Iterator<Item = f32>) {
         self.channels.push(Samples::Float(samples.collect()));
-    }
-
-    fn add_means(&mut self, values: &mut Filtered, spp: u32, took: &[u32]) {
-        self.channels.extend(replace(values, Filtered::Unasked).means(spp, took));
     }
 }
 

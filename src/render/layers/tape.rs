@@ -6,7 +6,7 @@ use super::sums::{LayerWork, Place, Places, Sums};
 use crate::accel::PACKETS;
 use crate::film::Window;
 use crate::integrate::{RayKind, Record, Samples8, Seen, Silent, Spent, Summed, Taken};
-use crate::lanes::{LANES, Mask8, Ray, Vec3x8};
+use crate::lanes::{LANES, Mask8, Ray, Vec3x8, bits};
 use crate::plan::Owner;
 use crate::reference;
 use crate::render::{Frame, shutter};
@@ -34,11 +34,15 @@ struct Packet {
     index: [u32; LANES],
     /// Lanes that are the nearest to the centres of their pixels.
     nearest: u32,
-    whole: bool,
+    /// Whether all lanes are of one pixel.
+    one: bool,
 }
 
 impl Packet {
     fn lanes_of(&self, pixel: u32) -> u32 {
+        if self.one {
+            return if self.pixels[0] == pixel { (1 << LANES) - 1 } else { 0 };
+        }
         (0..LANES).fold(0, |lanes, i| lanes | u32::from(self.pixels[i] == pixel) << i)
     }
 }
@@ -87,38 +91,35 @@ impl<'a, 's> LayerTape<'a, 's> {
     }
 
     fn add_to_mattes(&mut self, packet: &Packet, seen: &Seen) {
-        for i in lanes(seen.hit) {
+        for i in bits(seen.hit) {
             let (pixel, owner) = (packet.pixels[i] as usize, seen.owners[i]);
             self.sums.add_to_mattes(self.plan, pixel, owner.primitive, seen.materials[i]);
         }
     }
 
+    #[inline(always)]
     fn add_nearest(&mut self, packet: &Packet, nearest: u32, seen: &Seen) {
         let (t, dir) = (seen.rays.t_max, seen.rays.dir);
         let share = self.axis.map_or_else(|| dir.length(), |axis| dir.dot(Vec3x8::splat(axis)));
         let (depth, t, rows) = ((t * share).to_array(), t.to_array(), seen.rows.to_array());
-        // Lanes that met nothing may hold anything: they are passed over.
-        let near = std::array::from_fn(|i| Near {
+        let near = |i: usize| Near {
             t: t[i],
             row: RowRef::from_lane(rows[i]),
             primitive: seen.owners[i].primitive,
             material: seen.materials[i],
             sample: packet.index[i],
-        });
-        let places = Places { pixels: &packet.pixels, lanes: nearest, whole: false };
-        let (plan, all) = (self.plan, self.sums.nearest());
+        };
+        let (objects, all) = (&self.plan.objects, self.sums.nearest());
         if nearest.is_power_of_two() {
             let i = nearest.trailing_zeros() as usize;
-            all.see(packet.pixels[i] as usize, near[i], depth[i], |primitive| plan.objects.of(primitive));
+            all.see(packet.pixels[i] as usize, near(i), depth[i], objects.of(seen.owners[i].primitive));
         } else {
-            all.see8(&places, &near, &depth, |primitive| plan.objects.of(primitive));
+            let places = Places { pixels: &packet.pixels, lanes: nearest, whole: false };
+            let mut primitives = [0; LANES];
+            (0..LANES).for_each(|i| primitives[i] = seen.owners[i].primitive);
+            all.see8(&places, &depth, [objects.of_all(primitives), *seen.materials], near);
         }
     }
-}
-
-/// The lanes of a mask.
-fn lanes(mask: u32) -> impl Iterator<Item = usize> {
-    (0..LANES).filter(move |i| mask >> i & 1 == 1)
 }
 
 impl Record for LayerTape<'_, '_> {
@@ -145,10 +146,10 @@ impl Record for LayerTape<'_, '_> {
         let packets = taken.samples.iter().zip(taken.pixels).zip(taken.distances);
         for (p, ((samples, pixels), distances)) in packets.enumerate() {
             let count = LANES.min(taken.count - p * LANES);
-            let nearest = self.sums.nearest().choose((pixels, &samples.index), distances, count);
+            let one = *pixels == [pixels[0]; LANES];
+            let nearest = self.sums.nearest().choose((pixels, one), distances, count);
             let (before, rest) = self.tile.split_at_mut(p);
-            let whole = self.whole && *pixels == [pixels[0]; LANES];
-            rest[0] = Packet { pixels: *pixels, index: samples.index, nearest, whole };
+            rest[0] = Packet { pixels: *pixels, index: samples.index, nearest, one };
             let goes_on = before.last().is_some_and(|packet| packet.pixels[LANES - 1] == pixels[0]);
             if goes_on && nearest & rest[0].lanes_of(pixels[0]) != 0 {
                 forget(before, pixels[0]);
@@ -157,21 +158,19 @@ impl Record for LayerTape<'_, '_> {
     }
 
     fn surface(&mut self, seen: &Seen) {
-        let packet = self.tile[seen.packet];
+        let packet = &{ self.tile[seen.packet] };
         let hit = Mask8::from_bits(seen.hit);
-        let places = Places { pixels: &packet.pixels, lanes: seen.hit, whole: packet.whole };
-        if self.sums.normal.is_asked() {
-            self.sums.normal.add8(&Vec3x8::select(hit, seen.normal, Vec3x8::ZERO), &places);
-        }
-        if self.sums.albedo.is_asked() {
-            self.sums.albedo.add8(&Vec3x8::select(hit, seen.bsdf.reflectance(), Vec3x8::ZERO), &places);
+        let places = Places { pixels: &packet.pixels, lanes: seen.hit, whole: self.whole && packet.one };
+        if self.sums.filtered.is_asked() {
+            let met = |value: Vec3x8| Vec3x8::select(hit, value, Vec3x8::ZERO);
+            self.sums.filtered.add8(&met(seen.normal), &met(seen.bsdf.reflectance()), &places);
         }
         let nearest = packet.nearest & seen.hit;
         if nearest != 0 {
-            self.add_nearest(&packet, nearest, seen);
+            self.add_nearest(packet, nearest, seen);
         }
         if self.sums.want_mattes() {
-            self.add_to_mattes(&packet, seen);
+            self.add_to_mattes(packet, seen);
         }
     }
 

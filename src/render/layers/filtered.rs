@@ -1,0 +1,112 @@
+//! What passes the pixel filter: normals and albedos.
+
+use glam::DVec3;
+
+use super::sums::Places;
+use crate::film::Samples;
+use crate::lanes::{Float8, LANES, Vec3x8};
+use crate::scene::{Aov, Layers};
+
+/// Means of the normals and albedos of each pixel. Samples are drawn from the filter, so all weigh the same.
+///
+/// A pixel is a row of eight numbers: x, y, z, red, green, blue, and two to spare. So a packet is turned into rows once,
+/// and each of them is added at one go.
+#[derive(Debug)]
+pub(in crate::render) enum Filtered {
+    /// No layer needs them.
+    Unasked,
+    /// Of a single sample: the values.
+    Single(Vec<[f32; LANES]>),
+    /// Of several: their sums.
+    Sums(Vec<[f64; LANES]>),
+}
+
+impl Filtered {
+    /// `spp` is `None` where pixels differ.
+    pub fn new(layers: Layers, pixels: usize, spp: Option<u32>) -> Self {
+        match (layers.has_any(&[Aov::Normal, Aov::Albedo]), spp) {
+            (false, _) => Filtered::Unasked,
+            (true, Some(1)) => Filtered::Single(vec![[0.0; LANES]; pixels]),
+            (true, _) => Filtered::Sums(vec![[0.0; LANES]; pixels]),
+        }
+    }
+
+    pub fn is_asked(&self) -> bool {
+        !matches!(self, Filtered::Unasked)
+    }
+
+    /// Adds a packet to its pixels; lanes that do not count have 0.
+    #[inline(always)]
+    pub fn add8(&mut self, normal: &Vec3x8, albedo: &Vec3x8, places: &Places) {
+        let zero = Float8::ZERO;
+        let rows = [normal.x, normal.y, normal.z, albedo.x, albedo.y, albedo.z, zero, zero];
+        let rows = Float8::transpose(rows);
+        match self {
+            Filtered::Unasked => {}
+            Filtered::Single(values) => {
+                for (pixel, row) in places.pixels.iter().zip(rows) {
+                    let value = &mut values[*pixel as usize];
+                    *value = (Float8::new(*value) + row).to_array();
+                }
+            }
+            // In an order that is always the same for these samples.
+            Filtered::Sums(sums) if places.whole => {
+                let four: [Float8; 4] = std::array::from_fn(|i| rows[i] + rows[i + 4]);
+                add(&mut sums[places.pixels[0] as usize], (four[0] + four[2]) + (four[1] + four[3]));
+            }
+            // In the order of the lanes, so that it does not matter how samples are spread over packets.
+            Filtered::Sums(sums) => {
+                places.pixels.iter().zip(rows).for_each(|(pixel, row)| add(&mut sums[*pixel as usize], row));
+            }
+        }
+    }
+
+    /// Adds one sample to a pixel.
+    pub fn add(&mut self, pixel: usize, normal: DVec3, albedo: DVec3) {
+        let values = normal.to_array().into_iter().chain(albedo.to_array());
+        match self {
+            Filtered::Unasked => {}
+            Filtered::Single(rows) => rows[pixel].iter_mut().zip(values).for_each(|(own, value)| *own += value as f32),
+            Filtered::Sums(rows) => rows[pixel].iter_mut().zip(values).for_each(|(own, value)| *own += value),
+        }
+    }
+
+    /// Normals and albedos of all pixels, three channels each; `samples` is how many a pixel has.
+    pub fn finish(self, samples: impl Fn(usize) -> u32) -> [[Samples; 3]; 2] {
+        let columns = match self {
+            Filtered::Unasked => Default::default(),
+            Filtered::Single(values) => columns(values.len(), |pixel| Float8::new(values[pixel])),
+            Filtered::Sums(sums) => columns(sums.len(), |pixel| {
+                let share = 1.0 / f64::from(samples(pixel));
+                Float8::new(sums[pixel].map(|sum| (sum * share) as f32))
+            }),
+        };
+        let [x, y, z, red, green, blue] = columns.map(|column| Samples::Half(column.into()));
+        [[x, y, z], [red, green, blue]]
+    }
+}
+
+impl Default for Filtered {
+    fn default() -> Self {
+        Filtered::Unasked
+    }
+}
+
+#[inline(always)]
+fn add(sums: &mut [f64; LANES], values: Float8) {
+    sums.iter_mut().zip(values.to_array()).for_each(|(sum, value)| *sum += f64::from(value));
+}
+
+/// The first six numbers of so many rows, by column.
+#[inline(always)]
+fn columns(count: usize, row: impl Fn(usize) -> Float8) -> [Vec<f32>; 6] {
+    let mut columns = [(); 6].map(|()| Vec::with_capacity(count));
+    for first in (0..count).step_by(LANES) {
+        let own = LANES.min(count - first);
+        let rows = std::array::from_fn(|i| if i < own { row(first + i) } else { Float8::ZERO });
+        for (column, values) in columns.iter_mut().zip(Float8::transpose(rows)) {
+            column.extend_from_slice(&values.to_array()[..own]);
+        }
+    }
+    columns
+}
