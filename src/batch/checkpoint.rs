@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
-use crate::film::{Channel, Cryptomatte, Picture, Samples, Window};
+use crate::film::{Channel, Cryptomatte, Picture, SampleKind, Samples, Window};
 use crate::output::{OutputError, aside};
 use crate::render::{Gathering, Task, Unfinished};
 
@@ -108,10 +108,10 @@ impl<'c> Saves<'c> {
 }
 
 fn encode(key: &str, done: Vec<bool>, picture: &Picture) -> Vec<u8> {
-    let kind = |channel: &Channel| match channel.samples {
-        Samples::Half(_) => 'h',
-        Samples::Float(_) => 'f',
-        Samples::Uint(_) => 'u',
+    let kind = |channel: &Channel| match channel.samples.kind() {
+        SampleKind::Half => 'h',
+        SampleKind::Float => 'f',
+        SampleKind::Uint => 'u',
     };
     let Window { x0, y0, x1, y1 } = picture.window;
     let head = Head {
@@ -129,10 +129,8 @@ fn encode(key: &str, done: Vec<bool>, picture: &Picture) -> Vec<u8> {
     bytes.extend(picture.pixels.as_flattened().iter().flat_map(|value| value.to_le_bytes()));
     for channel in &picture.channels {
         match &channel.samples {
-            Samples::Half(values) | Samples::Float(values) => {
-                bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
-            }
             Samples::Uint(values) => bytes.extend(values.iter().flat_map(|value| value.to_le_bytes())),
+            floats => bytes.extend(floats.floats().iter().flat_map(|all| all.iter()).flat_map(|one| one.to_le_bytes())),
         }
     }
     bytes
@@ -159,10 +157,10 @@ fn decode(bytes: &[u8]) -> Option<(Head, Picture)> {
     picture.pixels = values.as_chunks::<4>().0.to_vec().into();
     for (name, kind) in &head.channels {
         let words = words(area);
-        let floats = || words.iter().copied().map(f32::from_le_bytes).collect();
+        let floats = || words.iter().copied().map(f32::from_le_bytes).collect::<Vec<_>>();
         let samples = match kind {
-            'h' => Samples::Half(floats()),
-            'f' => Samples::Float(floats()),
+            'h' => Samples::halves(&floats()),
+            'f' => Samples::Float(floats().into()),
             'u' => Samples::Uint(words.iter().copied().map(u32::from_le_bytes).collect()),
             _ => return None,
         };

@@ -15,8 +15,8 @@ pub fn write(job: &Job, rendering: &Rendering, run: &Run) -> Result<(), Failure>
     }
     let (picture, name) = (&rendering.picture, job.output.with_extension("cost.png"));
     let tests = |name: &str| picture.channel(name).and_then(|channel| channel.samples.floats()).unwrap_or_default();
-    let pairs = tests("cost.box").iter().zip(tests("cost.prim"));
-    let values: Vec<f64> = pairs.map(|(boxes, prims)| f64::from(*boxes) + f64::from(*prims)).collect();
+    let (boxes, prims) = (tests("cost.box"), tests("cost.prim"));
+    let values: Vec<f64> = boxes.iter().zip(&*prims).map(|(a, b)| f64::from(*a) + f64::from(*b)).collect();
     let map = heatmap::map_of(&values, picture.window).map_err(|error| Failure::new(Exit::Output, error))?;
     let bytes = png::encode_raster(&map, "Box and primitive tests of each pixel")
         .map_err(|error| Failure::new(Exit::Output, error))?;

@@ -2,6 +2,8 @@
 
 use std::mem::take;
 
+use half::f16;
+
 use super::{Picture, Samples, Window};
 
 /// Some rows of a picture, all of its width, to write in.
@@ -17,6 +19,7 @@ pub struct Band<'p> {
 /// Samples of one channel in a band.
 #[derive(Debug)]
 enum Strip<'p> {
+    Halves(&'p mut [f16]),
     Floats(&'p mut [f32]),
     Uint(&'p mut [u32]),
 }
@@ -57,7 +60,8 @@ impl Band<'_> {
                 let Some(start) = self.window.index(window.x0, y) else { continue };
                 let (to, from) = (start..start + width, row * width..(row + 1) * width);
                 match (&mut *strip, samples) {
-                    (Strip::Floats(own), Samples::Half(more) | Samples::Float(more)) => {
+                    (Strip::Halves(own), Samples::Half(more)) => own[to].copy_from_slice(&more[from]),
+                    (Strip::Floats(own), Samples::Unrounded(more) | Samples::Float(more)) => {
                         own[to].copy_from_slice(&more[from]);
                     }
                     (Strip::Uint(own), Samples::Uint(more)) => own[to].copy_from_slice(&more[from]),
@@ -74,7 +78,10 @@ impl Band<'_> {
         picture.pixels[place.clone()].copy_from_slice(self.pixels);
         for (own, channel) in self.channels.iter().zip(&mut picture.channels) {
             match (own, &mut channel.samples) {
-                (Strip::Floats(own), Samples::Half(to) | Samples::Float(to)) => to[place.clone()].copy_from_slice(own),
+                (Strip::Halves(own), Samples::Half(to)) => to[place.clone()].copy_from_slice(own),
+                (Strip::Floats(own), Samples::Unrounded(to) | Samples::Float(to)) => {
+                    to[place.clone()].copy_from_slice(own);
+                }
                 (Strip::Uint(own), Samples::Uint(to)) => to[place.clone()].copy_from_slice(own),
                 _ => {}
             }
@@ -85,7 +92,8 @@ impl Band<'_> {
 impl<'p> Strip<'p> {
     fn of(samples: &'p mut Samples) -> Self {
         match samples {
-            Samples::Half(samples) | Samples::Float(samples) => Strip::Floats(samples),
+            Samples::Half(samples) => Strip::Halves(samples),
+            Samples::Unrounded(samples) | Samples::Float(samples) => Strip::Floats(samples),
             Samples::Uint(samples) => Strip::Uint(samples),
         }
     }
@@ -93,6 +101,10 @@ impl<'p> Strip<'p> {
     /// Takes the first samples out.
     fn split_off(&mut self, count: usize) -> Self {
         let (first, rest) = match self {
+            Strip::Halves(all) => {
+                let (first, rest) = take(all).split_at_mut(count);
+                (Strip::Halves(first), Strip::Halves(rest))
+            }
             Strip::Floats(all) => {
                 let (first, rest) = take(all).split_at_mut(count);
                 (Strip::Floats(first), Strip::Floats(rest))
@@ -118,7 +130,8 @@ mod tests {
         blank.pixels.fill([0.0; 4]);
         for channel in &mut blank.channels {
             match &mut channel.samples {
-                Samples::Half(samples) | Samples::Float(samples) => samples.fill(0.0),
+                Samples::Half(samples) => samples.fill(f16::ZERO),
+                Samples::Unrounded(samples) | Samples::Float(samples) => samples.fill(0.0),
                 Samples::Uint(samples) => samples.fill(0),
             }
         }
@@ -137,7 +150,8 @@ mod tests {
         let mut channel = |name: &str, samples| whole.channels.push(Channel { name: name.into(), samples });
         channel("depth.Z", Samples::Float(floats.clone()));
         channel("id.object", Samples::Uint(numbers.collect()));
-        channel("N.X", Samples::Half(floats));
+        channel("N.X", Samples::halves(&floats));
+        channel("albedo.R", Samples::Unrounded(floats));
         let mut made = blank(&whole);
         assert!(made != whole);
         let mut bands = made.bands(8);

@@ -1,6 +1,10 @@
 //! One channel beside the colour.
 
+use std::borrow::Cow;
 use std::ops::Range;
+
+use half::f16;
+use half::slice::HalfFloatSliceExt;
 
 use super::Plane;
 
@@ -16,19 +20,51 @@ pub struct Channel {
 /// Samples of a channel, by the type that a file stores them in.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Samples {
-    /// 16-bit floats; held here in 32, rounded when written.
-    Half(Plane<f32>),
+    /// 16-bit floats.
+    Half(Plane<f16>),
+    /// 16-bit floats that are rounded when they are written: those of colours in other primaries than their file's.
+    Unrounded(Plane<f32>),
     /// 32-bit floats, also where colour is stored in 16.
     Float(Plane<f32>),
     /// 32-bit unsigned integers.
     Uint(Plane<u32>),
 }
 
+/// The type that a file stores samples in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SampleKind {
+    /// 16-bit floats.
+    Half,
+    /// 32-bit floats.
+    Float,
+    /// 32-bit unsigned integers.
+    Uint,
+}
+
+impl SampleKind {
+    /// So many zeros.
+    pub fn zeros(self, count: usize) -> Samples {
+        match self {
+            SampleKind::Half => Samples::Half(Plane::zeroed(count)),
+            SampleKind::Float => Samples::Float(Plane::zeroed(count)),
+            SampleKind::Uint => Samples::Uint(Plane::zeroed(count)),
+        }
+    }
+}
+
 impl Samples {
+    /// Rounded to the nearest halves, of which the largest is 65504 and the next infinity.
+    pub fn halves(samples: &[f32]) -> Samples {
+        let mut halves = vec![f16::ZERO; samples.len()];
+        halves.convert_from_f32_slice(samples);
+        Samples::Half(halves.into())
+    }
+
     /// How many there are.
     pub fn len(&self) -> usize {
         match self {
-            Samples::Half(samples) | Samples::Float(samples) => samples.len(),
+            Samples::Half(samples) => samples.len(),
+            Samples::Unrounded(samples) | Samples::Float(samples) => samples.len(),
             Samples::Uint(samples) => samples.len(),
         }
     }
@@ -38,10 +74,20 @@ impl Samples {
         self.len() == 0
     }
 
+    /// The type that a file stores them in.
+    pub fn kind(&self) -> SampleKind {
+        match self {
+            Samples::Half(_) | Samples::Unrounded(_) => SampleKind::Half,
+            Samples::Float(_) => SampleKind::Float,
+            Samples::Uint(_) => SampleKind::Uint,
+        }
+    }
+
     /// The bits of one of them, as it is held here.
     pub fn bits(&self, i: usize) -> u32 {
         match self {
-            Samples::Half(samples) | Samples::Float(samples) => samples[i].to_bits(),
+            Samples::Half(samples) => samples[i].to_bits().into(),
+            Samples::Unrounded(samples) | Samples::Float(samples) => samples[i].to_bits(),
             Samples::Uint(samples) => samples[i],
         }
     }
@@ -50,16 +96,29 @@ impl Samples {
     pub fn rows(&self, rows: &[Range<usize>]) -> Samples {
         match self {
             Samples::Half(samples) => Samples::Half(pick(samples, rows)),
+            Samples::Unrounded(samples) => Samples::Unrounded(pick(samples, rows)),
             Samples::Float(samples) => Samples::Float(pick(samples, rows)),
             Samples::Uint(samples) => Samples::Uint(pick(samples, rows)),
         }
     }
 
     /// Floats of either width; `None` for integers.
-    pub fn floats(&self) -> Option<&[f32]> {
+    pub fn floats(&self) -> Option<Cow<'_, [f32]>> {
         match self {
-            Samples::Half(samples) | Samples::Float(samples) => Some(samples),
+            Samples::Half(samples) => Some(samples.to_f32_vec().into()),
+            Samples::Unrounded(samples) | Samples::Float(samples) => Some(Cow::Borrowed(samples)),
             Samples::Uint(_) => None,
+        }
+    }
+
+    /// The same floats to write in, no longer rounded; `None` for integers.
+    pub fn unrounded(&mut self) -> Option<&mut [f32]> {
+        if let Samples::Half(samples) = self {
+            *self = Samples::Unrounded(samples.to_f32_vec().into());
+        }
+        match self {
+            Samples::Unrounded(samples) | Samples::Float(samples) => Some(samples),
+            Samples::Half(_) | Samples::Uint(_) => None,
         }
     }
 }

@@ -48,9 +48,7 @@ impl Cryptomatte {
             .iter()
             .filter(|channel| self.owns(channel))
             .filter(ids)
-            .filter_map(|channel| channel.samples.floats())
-            .flatten()
-            .map(|id| id.to_bits())
+            .flat_map(|channel| (0..channel.samples.len()).map(|i| channel.samples.bits(i)))
             .collect();
         let manifest = self.manifest.iter().filter(|(_, id)| seen.contains(id));
         Cryptomatte { name: self.name.clone(), manifest: manifest.map(|(name, id)| (name.clone(), *id)).collect() }

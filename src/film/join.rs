@@ -1,6 +1,6 @@
 //! Crops of one frame, joined to the whole.
 
-use super::{Channel, Cryptomatte, Picture, Plane, Samples, Window};
+use super::{Channel, Cryptomatte, Picture, Samples, Window};
 
 /// Why crops do not make a frame. Parts are told by their number, from 0.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -81,7 +81,7 @@ impl Picture {
             window = Window { x0: x0.min(left), y0: y0.min(top), x1: x1.max(right), y1: y1.max(bottom) };
         }
         let mut whole = Picture::new(first.display, window);
-        whole.channels = first.channels.iter().map(|channel| blank(channel, window.area())).collect();
+        whole.channels = first.channels.iter().map(|channel| blank(channel, parts, window.area())).collect();
         let mut filled = vec![false; window.area()];
         for (part, picture) in parts.iter().enumerate() {
             place(part, picture, &mut whole, &mut filled)?;
@@ -96,7 +96,7 @@ impl Picture {
 }
 
 fn same_layers(part: usize, picture: &Picture, first: &Picture) -> Result<(), JoinError> {
-    let alike = |a: &Samples, b: &Samples| std::mem::discriminant(a) == std::mem::discriminant(b);
+    let alike = |a: &Samples, b: &Samples| a.kind() == b.kind();
     let lacks = |picture: &Picture, channel: &Channel| {
         !picture.channel(&channel.name).is_some_and(|found| alike(&found.samples, &channel.samples))
     };
@@ -106,13 +106,15 @@ fn same_layers(part: usize, picture: &Picture, first: &Picture) -> Result<(), Jo
     found.map_or(Ok(()), |(channel, has)| Err(JoinError::Layers { part, name: channel.name.clone(), has }))
 }
 
-fn blank(channel: &Channel, area: usize) -> Channel {
-    let samples = match channel.samples {
-        Samples::Half(_) => Samples::Half(Plane::zeroed(area)),
-        Samples::Float(_) => Samples::Float(Plane::zeroed(area)),
-        Samples::Uint(_) => Samples::Uint(Plane::zeroed(area)),
-    };
-    Channel { name: channel.name.clone(), samples }
+/// A channel of the whole, without anything in it.
+fn blank(channel: &Channel, parts: &[Picture], area: usize) -> Channel {
+    let Channel { name, samples } = channel;
+    let (name, mut samples) = (name.clone(), samples.kind().zeros(area));
+    let is_unrounded = |channel: &Channel| matches!(channel.samples, Samples::Unrounded(_));
+    if parts.iter().any(|part| part.channel(&name).is_some_and(is_unrounded)) {
+        samples.unrounded();
+    }
+    Channel { name, samples }
 }
 
 /// Puts a part into the whole, and looks at what is there already.
@@ -127,7 +129,14 @@ fn place(part: usize, picture: &Picture, whole: &mut Picture, filled: &mut [bool
         same &= put(&mut whole.pixels[place], picture.pixels[from], |a, b| a.map(f32::to_bits) == b.map(f32::to_bits));
         for (channel, source) in whole.channels.iter_mut().zip(&channels) {
             same &= match (&mut channel.samples, &source.samples) {
-                (Samples::Half(to), Samples::Half(samples)) | (Samples::Float(to), Samples::Float(samples)) => {
+                (Samples::Half(to), Samples::Half(samples)) => {
+                    put(&mut to[place], samples[from], |a, b| a.to_bits() == b.to_bits())
+                }
+                (Samples::Unrounded(to), Samples::Half(samples)) => {
+                    put(&mut to[place], samples[from].to_f32(), |a, b| a.to_bits() == b.to_bits())
+                }
+                (Samples::Unrounded(to), Samples::Unrounded(samples))
+                | (Samples::Float(to), Samples::Float(samples)) => {
                     put(&mut to[place], samples[from], |a, b| a.to_bits() == b.to_bits())
                 }
                 (Samples::Uint(to), Samples::Uint(samples)) => put(&mut to[place], samples[from], |a, b| a == b),

@@ -12,7 +12,7 @@ mod picture;
 mod plane;
 
 pub use self::band::Band;
-pub use self::channel::{Channel, Samples};
+pub use self::channel::{Channel, SampleKind, Samples};
 pub use self::cryptomatte::Cryptomatte;
 pub use self::join::JoinError;
 pub use self::picture::{Picture, Window};

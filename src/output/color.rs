@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use glam::{DMat3, DVec2, DVec3};
 
-use crate::film::{Channel, Picture, Samples};
+use crate::film::{Channel, Picture};
 
 /// Where the primaries and the white of linear colours lie on the CIE 1931 xy diagram.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -101,23 +101,17 @@ fn convert_layer(channels: &mut [Channel], layer: &str, convert: impl Fn(DVec3) 
     };
     let (Some(r), Some(g), Some(b)) = (place("R"), place("G"), place("B")) else { return };
     let Ok([r, g, b]) = channels.get_disjoint_mut([r, g, b]) else { return };
-    let (Some(r), Some(g), Some(b)) = (floats(r), floats(g), floats(b)) else { return };
+    let [r, g, b] = [r, g, b].map(|channel| channel.samples.unrounded());
+    let (Some(r), Some(g), Some(b)) = (r, g, b) else { return };
     for ((r, g), b) in r.iter_mut().zip(g).zip(b) {
         (*r, *g, *b) = convert(DVec3::new((*r).into(), (*g).into(), (*b).into())).as_vec3().into();
-    }
-}
-
-fn floats(channel: &mut Channel) -> Option<&mut [f32]> {
-    match &mut channel.samples {
-        Samples::Half(samples) | Samples::Float(samples) => Some(samples),
-        Samples::Uint(_) => None,
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::Window;
+    use crate::film::{Samples, Window};
 
     /// Rows of the matrix from linear sRGB to ACEScg with Bradford adaptation, as colour-science prints them.
     #[test]

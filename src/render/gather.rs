@@ -3,7 +3,7 @@
 //! Blocks that are kept until all are there take the memory of a picture twice, and memory that is touched for the first
 //! time costs more than what is written there, because the system clears it page by page.
 
-use std::mem::{discriminant, take};
+use std::mem::take;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
@@ -62,7 +62,7 @@ impl<'s> Task<'s> {
     pub fn go_on(&self, picture: Picture, done: Vec<bool>) -> Option<Unfinished> {
         let mut unfinished = self.begin();
         let kinds = |picture: &Picture| -> Vec<_> {
-            let kind = |channel: &Channel| (channel.name.clone(), discriminant(&channel.samples));
+            let kind = |channel: &Channel| (channel.name.clone(), channel.samples.kind());
             picture.channels.iter().map(kind).collect()
         };
         let own = &unfinished.picture;

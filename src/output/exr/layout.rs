@@ -34,7 +34,8 @@ pub(super) enum Source<'a> {
         slot: usize,
         float: bool,
     },
-    Half(&'a [f32]),
+    Half(&'a [f16]),
+    Unrounded(&'a [f32]),
     Float(&'a [f32]),
     Uint(&'a [u32]),
 }
@@ -50,7 +51,7 @@ pub(super) fn parts<'a>(picture: &'a Picture, storage: Storage) -> Result<Vec<Pa
     let lossy = storage.compression.may_loose_data();
     let mut parts: Vec<Part<'a>> = Vec::new();
     for (channel, group) in stored(picture, storage) {
-        let exact = lossy && group.is_some() && !matches!(channel.source, Source::Half(_));
+        let exact = lossy && group.is_some() && channel.source.kind() != SampleType::F16;
         let name = match group {
             Some(layer) if storage.multipart => layer,
             _ if exact => "data".to_owned(),
@@ -83,6 +84,7 @@ fn stored<'a>(picture: &'a Picture, storage: Storage) -> impl Iterator<Item = (S
     let beside = picture.channels.iter().map(move |channel| {
         let source = match &channel.samples {
             Samples::Half(samples) => Source::Half(samples),
+            Samples::Unrounded(samples) => Source::Unrounded(samples),
             Samples::Float(samples) => Source::Float(samples),
             Samples::Uint(samples) => Source::Uint(samples),
         };
@@ -134,7 +136,7 @@ impl Part<'_> {
 impl Source<'_> {
     pub fn kind(&self) -> SampleType {
         match self {
-            Source::Color { float: false, .. } | Source::Half(_) => SampleType::F16,
+            Source::Color { float: false, .. } | Source::Half(_) | Source::Unrounded(_) => SampleType::F16,
             Source::Color { float: true, .. } | Source::Float(_) => SampleType::F32,
             Source::Uint(_) => SampleType::U32,
         }
@@ -146,7 +148,12 @@ impl Source<'_> {
                 let samples: Vec<f32> = pixels[row].iter().map(|pixel| pixel[slot]).collect();
                 if float { put_floats(&samples, bytes) } else { put_halves(&samples, bytes) }
             }
-            Source::Half(samples) => put_halves(&samples[row], bytes),
+            Source::Half(samples) => {
+                let places = bytes.as_chunks_mut().0.iter_mut();
+                let sound = |sample: &f16| if sample.is_finite() { *sample } else { f16::ZERO };
+                places.zip(&samples[row]).for_each(|(place, sample)| *place = sound(sample).to_ne_bytes());
+            }
+            Source::Unrounded(samples) => put_halves(&samples[row], bytes),
             Source::Float(samples) => put_floats(&samples[row], bytes),
             Source::Uint(samples) => {
                 let places = bytes.as_chunks_mut().0.iter_mut();
@@ -159,7 +166,8 @@ impl Source<'_> {
     pub fn losses(&self) -> Losses {
         match *self {
             Source::Color { pixels, slot, float } => losses(!float, pixels.iter().map(|pixel| pixel[slot])),
-            Source::Half(samples) => losses(true, samples.iter().copied()),
+            Source::Half(samples) => losses(true, samples.iter().map(|sample| sample.to_f32())),
+            Source::Unrounded(samples) => losses(true, samples.iter().copied()),
             Source::Float(samples) => losses(false, samples.iter().copied()),
             Source::Uint(_) => Losses::default(),
         }

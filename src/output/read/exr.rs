@@ -17,7 +17,7 @@ use half::f16;
 
 use super::mattes;
 use super::{Contents, Fault, HashPair, check_length, check_pixels};
-use crate::film::{Channel, Picture, Plane, Samples, Window};
+use crate::film::{Channel, Picture, SampleKind, Samples, Window};
 use crate::output::color::{self, Primaries};
 use crate::output::exr::{Attributes, ColorSpace, PIXEL_HASH, Storage};
 use crate::output::pixel_hash::{Digests, PixelHash};
@@ -147,9 +147,9 @@ impl Plan {
         let channel = |(name, kind): &(String, SampleType)| Channel {
             name: name.clone(),
             samples: match kind {
-                SampleType::F16 => Samples::Half(Plane::zeroed(area)),
-                SampleType::F32 => Samples::Float(Plane::zeroed(area)),
-                SampleType::U32 => Samples::Uint(Plane::zeroed(area)),
+                SampleType::F16 => SampleKind::Half.zeros(area),
+                SampleType::F32 => SampleKind::Float.zeros(area),
+                SampleType::U32 => SampleKind::Uint.zeros(area),
             },
         };
         Picture {
@@ -321,7 +321,14 @@ impl Part {
                 }
             }
             Slot::Channel(channel) => match &mut picture.channels[channel].samples {
-                Samples::Half(samples) | Samples::Float(samples) => {
+                Samples::Half(samples) => {
+                    let found = line.read_samples::<f16>().skip(skipped);
+                    samples[row]
+                        .iter_mut()
+                        .zip(found)
+                        .try_for_each(|(slot, value)| value.map(|value| *slot = value))?;
+                }
+                Samples::Unrounded(samples) | Samples::Float(samples) => {
                     samples[row].copy_from_slice(&floats(&line, kind)?[skipped..skipped + count]);
                 }
                 Samples::Uint(samples) => {

@@ -81,7 +81,7 @@ impl Filtered {
                 Float8::new(sums[pixel].map(|sum| (sum * share) as f32))
             }),
         };
-        let [x, y, z, red, green, blue] = columns.map(|column| Samples::Half(column.into()));
+        let [x, y, z, red, green, blue] = columns.map(|column| Samples::halves(&column));
         [[x, y, z], [red, green, blue]]
     }
 }

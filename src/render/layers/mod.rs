@@ -26,7 +26,7 @@ pub(super) use self::tape::LayerTape;
 
 use super::adaptive::Effort;
 use super::{Renderer, shutter};
-use crate::film::{Channel, Cryptomatte, Picture, Plane, Samples};
+use crate::film::{Channel, Cryptomatte, Picture, SampleKind, Samples};
 use crate::scene::{Aov, Camera, Layers, Objects, Scene, carried};
 
 /// The depth of a miss: finite, so that filters do not spread infinity.
@@ -53,14 +53,6 @@ pub(super) struct LayerPlan<'s> {
     pub objects: Objects,
     /// Bits of the ids of each Cryptomatte that is asked for, by key.
     ids: [Vec<u32>; Aov::CRYPTOMATTES.len()],
-}
-
-/// How the samples of a channel are stored.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Half,
-    Float,
-    Uint,
 }
 
 impl<'s> LayerPlan<'s> {
@@ -128,14 +120,7 @@ impl<'s> LayerPlan<'s> {
     /// Puts the channels into a picture, all 0.
     pub fn open(&self, picture: &mut Picture) {
         let area = picture.window.area();
-        let blank = |(name, kind): (String, Kind)| {
-            let samples = match kind {
-                Kind::Half => Samples::Half(Plane::zeroed(area)),
-                Kind::Float => Samples::Float(Plane::zeroed(area)),
-                Kind::Uint => Samples::Uint(Plane::zeroed(area)),
-            };
-            Channel { name, samples }
-        };
+        let blank = |(name, kind): (String, SampleKind)| Channel { name, samples: kind.zeros(area) };
         picture.channels = channels(self.layers).into_iter().map(blank).collect();
     }
 
@@ -202,30 +187,30 @@ pub(super) fn channel_count(layers: Layers) -> usize {
 }
 
 /// Channels in the order of their samples in a block.
-fn channels(layers: Layers) -> Vec<(String, Kind)> {
+fn channels(layers: Layers) -> Vec<(String, SampleKind)> {
     layers.iter().flat_map(|aov| channels_of(layers, aov)).collect()
 }
 
-fn channels_of(layers: Layers, aov: Aov) -> Vec<(String, Kind)> {
-    let some = |layer: &str, suffixes: &str, kind| -> Vec<(String, Kind)> {
+fn channels_of(layers: Layers, aov: Aov) -> Vec<(String, SampleKind)> {
+    let some = |layer: &str, suffixes: &str, kind| -> Vec<(String, SampleKind)> {
         suffixes.chars().map(|suffix| (format!("{layer}.{suffix}"), kind)).collect()
     };
     let named = |names: &[&str], kind| names.iter().map(|name| ((*name).to_owned(), kind)).collect();
     match aov {
-        Aov::Depth => some("depth", "Z", Kind::Float),
-        Aov::Position => some("P", "XYZ", Kind::Float),
-        Aov::Normal => some("N", "XYZ", Kind::Half),
-        Aov::Albedo => some("albedo", "RGB", Kind::Half),
-        Aov::Uv => some("uv", "UV", Kind::Float),
-        Aov::Motion => some("forward", "uv", Kind::Float),
-        Aov::Ids => named(&["id.object", "id.material"], Kind::Uint),
-        Aov::Samples => some("samples", "Y", Kind::Float),
-        Aov::Variance => some("variance", "RGB", Kind::Float),
-        Aov::Margin => some("margin", "Y", Kind::Float),
-        Aov::Cost => named(&["cost.box", "cost.prim", "cost.lanes"], Kind::Float),
+        Aov::Depth => some("depth", "Z", SampleKind::Float),
+        Aov::Position => some("P", "XYZ", SampleKind::Float),
+        Aov::Normal => some("N", "XYZ", SampleKind::Half),
+        Aov::Albedo => some("albedo", "RGB", SampleKind::Half),
+        Aov::Uv => some("uv", "UV", SampleKind::Float),
+        Aov::Motion => some("forward", "uv", SampleKind::Float),
+        Aov::Ids => named(&["id.object", "id.material"], SampleKind::Uint),
+        Aov::Samples => some("samples", "Y", SampleKind::Float),
+        Aov::Variance => some("variance", "RGB", SampleKind::Float),
+        Aov::Margin => some("margin", "Y", SampleKind::Float),
+        Aov::Cost => named(&["cost.box", "cost.prim", "cost.lanes"], SampleKind::Float),
         Aov::CryptoObject | Aov::CryptoMaterial | Aov::CryptoGroup => {
             let parts = 0..layers.ranks / 2;
-            parts.flat_map(|part| some(&format!("{}{part:02}", aov.name()), "RGBA", Kind::Float)).collect()
+            parts.flat_map(|part| some(&format!("{}{part:02}", aov.name()), "RGBA", SampleKind::Float)).collect()
         }
     }
 }
