@@ -79,26 +79,7 @@ impl Aov {
 }
 
 /// Names that stand for several layers.
-const SETS: [(&str, &[Aov]); 2] = [
-    ("cryptomatte", &Aov::CRYPTOMATTES),
-    (
-        "all",
-        &[
-            Aov::Depth,
-            Aov::Position,
-            Aov::Normal,
-            Aov::Albedo,
-            Aov::Uv,
-            Aov::Motion,
-            Aov::Ids,
-            Aov::Samples,
-            Aov::Variance,
-            Aov::CryptoObject,
-            Aov::CryptoMaterial,
-            Aov::CryptoGroup,
-        ],
-    ),
-];
+const SETS: [&str; 2] = ["cryptomatte", "all"];
 
 /// The layers that a picture is to have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -131,11 +112,16 @@ impl Layers {
     /// # Errors
     /// The name is unknown; says which are known.
     pub fn with_named(self, name: &str) -> Result<Self, UnknownAov> {
-        if let Some((_, set)) = SETS.iter().find(|(known, _)| *known == name) {
-            return Ok(set.iter().fold(self, |layers, aov| layers.with(*aov)));
+        let means = |aov: &Aov| match name {
+            "cryptomatte" => Aov::CRYPTOMATTES.contains(aov),
+            "all" => !matches!(aov, Aov::Margin | Aov::Cost),
+            _ => aov.name() == name,
+        };
+        let found: Vec<Aov> = Aov::ALL.into_iter().filter(means).collect();
+        if found.is_empty() {
+            return Err(UnknownAov(name.to_owned()));
         }
-        let aov = Aov::ALL.into_iter().find(|aov| aov.name() == name);
-        aov.map(|aov| self.with(aov)).ok_or_else(|| UnknownAov(name.to_owned()))
+        Ok(found.into_iter().fold(self, Layers::with))
     }
 
     /// Whether one is among them.
@@ -166,7 +152,7 @@ pub struct UnknownAov(String);
 
 /// All names, for a reader.
 pub(super) fn known_names() -> String {
-    let names: Vec<&str> = Aov::ALL.into_iter().map(Aov::name).chain(SETS.map(|(name, _)| name)).collect();
+    let names: Vec<&str> = Aov::ALL.into_iter().map(Aov::name).chain(SETS).collect();
     names.join(", ")
 }
 
