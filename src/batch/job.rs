@@ -166,7 +166,7 @@ impl Job {
             spp: Some(renderer.image().spp),
             seed: Some(renderer.pattern()),
             file_stem: output::stem(&self.output),
-            frame: self.frame.and_then(|frame| i32::try_from(frame).ok()),
+            frame: i32::try_from(self.frame()).ok(),
             run: (!self.settings.undated).then_some(run),
             ..Description::default()
         }
