@@ -500,12 +500,19 @@ fn threads_come_from_slurm_where_nothing_is_said() {
 #[test]
 fn a_png_is_the_same_by_way_of_an_exr() {
     let room = Room::new();
-    for options in ["", "--exposure 1.5 --tonemap agx", "--tonemap reinhard --white 4", "--bits 16 --tonemap khronos"] {
-        room.texts(&format!("render scene.toml -q -o direct.png {options}"), 0);
-        room.texts("render scene.toml -q --float -o float.exr", 0);
+    for (render, options) in [
+        ("", ""),
+        ("", "--exposure 1.5 --tonemap agx"),
+        ("", "--tonemap reinhard --white 4"),
+        ("--background transparent", "--bits 16 --tonemap khronos"),
+        ("--background transparent --overscan 7", ""),
+        ("--background transparent --crop 3,2,40,30", ""),
+    ] {
+        room.texts(&format!("render scene.toml -q -o direct.png {render} {options}"), 0);
+        room.texts(&format!("render scene.toml -q --float -o float.exr {render}"), 0);
         room.texts(&format!("convert float.exr float.png {options}"), 0);
-        let pixels = |name: &str| output::read(&room.path(name)).unwrap().pixels;
-        assert!(pixels("direct.png") == pixels("float.png"), "{options}");
+        let [direct, float] = ["direct.png", "float.png"].map(|name| output::read(&room.path(name)).unwrap());
+        assert!((direct.window, direct.pixels) == (float.window, float.pixels), "{render} {options}");
     }
     room.texts("render scene.toml -q -o half.exr", 0);
     room.texts("render scene.toml -q -o direct.png", 0);

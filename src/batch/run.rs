@@ -231,12 +231,12 @@ impl Batch<'_> {
         if is_new {
             scene.warnings.iter().for_each(|warning| self.warn(index, warning.to_string()));
         }
-        let Some((mut rendering, description, annotations)) = self.picture(index, &shared)? else {
+        let Some((mut rendering, mut description, annotations)) = self.picture(index, &shared)? else {
             self.skip(index);
             return Ok(());
         };
         if scene.background.transparent && !job.settings.windows.is_crop() && job.format == Format::Exr {
-            rendering.picture.trim();
+            description.rendered = rendering.picture.trim();
         }
         self.watch.event(&Event::Traced(index, job, &rendering));
         let encoding = Instant::now();

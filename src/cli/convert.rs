@@ -94,7 +94,13 @@ fn convert_picture(args: &Args, run: &Run) -> Result<Exit, Failure> {
     let found = output::read_all(&args.input)?;
     // What the header says of the scene is the title of a PNG, as it is of one that is rendered.
     let scene = found.attributes.as_ref().and_then(|attributes| attributes.text("render/scene"));
-    let description = Description { scene, kept: found.attributes, ..Description::default() };
-    pictures::write(&found.picture, &target, options, &description, run)?;
+    let rendered = found.attributes.as_ref().and_then(|attributes| attributes.rendered(&found.picture));
+    // A PNG has no window beside its own: the edges that an EXR leaves out are there again.
+    let picture = match rendered.filter(|_| target.format() == Format::Png) {
+        Some(window) => found.picture.colors_in(window),
+        None => found.picture,
+    };
+    let description = Description { scene, kept: found.attributes, rendered, ..Description::default() };
+    pictures::write(&picture, &target, options, &description, run)?;
     Ok(Exit::Done)
 }

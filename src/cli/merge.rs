@@ -64,9 +64,9 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
     let mut whole = joined.map_err(|message| Failure::new(Exit::Input, message))?;
     drop(pictures);
     // As a render of the whole frame does: with a background there is nothing to trim.
-    whole.trim();
+    let rendered = whole.trim();
     let scene = kept.as_ref().and_then(|kept| kept.text("render/scene"));
-    let description = Description { scene, kept, ..Description::default() };
+    let description = Description { scene, kept, rendered, ..Description::default() };
     pictures::write(&whole, &target, options, &description, run)?;
     Ok(Exit::Done)
 }

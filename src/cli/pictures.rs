@@ -115,7 +115,7 @@ impl Target {
         Ok(Target::File(path.into(), format))
     }
 
-    fn format(&self) -> Format {
+    pub fn format(&self) -> Format {
         match self {
             Target::File(_, format) => *format,
             Target::Stdout => Format::Exr,

@@ -131,14 +131,21 @@ impl Picture {
         places.map(|(index, _)| self.window.pixel(index)).fold(None, grown).unwrap_or(start)
     }
 
-    /// Leaves out rows and columns at the edges that are wholly transparent.
-    pub fn trim(&mut self) {
+    /// Leaves out rows and columns at the edges that are wholly transparent; the window before, where there were such.
+    pub fn trim(&mut self) -> Option<Window> {
         let window = self.seen();
-        if window != self.window
-            && let Some(part) = self.crop(window)
-        {
-            *self = part;
+        let part = self.crop(window).filter(|_| window != self.window)?;
+        Some(std::mem::replace(self, part).window)
+    }
+
+    /// The colours alone in another window, transparent black where there are none.
+    pub fn colors_in(&self, window: Window) -> Picture {
+        let mut picture = Picture::new(self.display, window);
+        for (index, pixel) in picture.pixels.iter_mut().enumerate() {
+            let (x, y) = window.pixel(index);
+            *pixel = self.get(x, y).unwrap_or_default();
         }
+        picture
     }
 
     /// The part of the picture that lies in `window`; the frame stays the same, and manifests keep the names
@@ -204,7 +211,11 @@ mod tests {
             let index = picture.window.index(x, y).unwrap();
             picture.pixels[index][3] = 0.25;
         }
-        assert_eq!(picture.seen(), Window { x0: 2, y0: 0, x1: 5, y1: 4 });
+        let (whole, window) = (picture.clone(), Window { x0: 2, y0: 0, x1: 5, y1: 4 });
+        assert_eq!(picture.seen(), window);
+        assert_eq!((picture.trim(), picture.window), (Some(whole.window), window));
+        assert_eq!(picture.trim(), None);
+        assert_eq!(picture.colors_in(whole.window), whole);
     }
 
     #[test]

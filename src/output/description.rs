@@ -3,6 +3,7 @@
 use std::time::{Duration, SystemTime};
 
 use super::exr::Attributes;
+use crate::film::Window;
 use crate::scene::Camera;
 
 /// Where a picture comes from. All of it goes into an EXR header, the title also into a PNG.
@@ -24,6 +25,8 @@ pub struct Description {
     pub seed: Option<u64>,
     /// The number of the frame: `render/frame`.
     pub frame: Option<i32>,
+    /// The pixels that were rendered, where the picture has fewer because the others are transparent: `render/window`.
+    pub rendered: Option<Window>,
     /// Frames per second as a fraction; readers assume 24/1 where it is absent, and so does `None` here.
     pub frames_per_second: Option<(i32, u32)>,
     /// Who owns the picture.

@@ -11,13 +11,17 @@ use exr::prelude::LineOrder;
 use super::layout::Part;
 use super::manifest::{self, Manifest};
 use super::{Storage, text};
-use crate::film::Picture;
+use crate::film::{Picture, Window};
 use crate::output::color::Primaries;
+use crate::output::read::MOST_PIXELS;
 use crate::output::view::View;
 use crate::output::{Description, EncodeError, description};
 
 /// The attribute that holds the hash of the samples.
 pub const PIXEL_HASH: &str = "render/pixelHash";
+
+/// The attribute that holds the window that was rendered.
+const RENDERED: &str = "render/window";
 
 /// Attributes of a file that say neither what its samples are nor where they lie, kept for the next file.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,6 +39,15 @@ impl Attributes {
             AttributeValue::F32(number) => Some(number.to_string()),
             _ => None,
         }
+    }
+
+    /// The window that was rendered, where that is said to be larger than the picture's.
+    pub fn rendered(&self, picture: &Picture) -> Option<Window> {
+        let AttributeValue::IntegerBounds(found) = self.own.other.get(&text(RENDERED))? else { return None };
+        let far = |from: i32, size: usize| from.checked_add(i32::try_from(size).ok()?);
+        let (Vec2(x0, y0), Vec2(width, height)) = (found.position, found.size);
+        let window = Window { x0, y0, x1: far(x0, width)?, y1: far(y0, height)? };
+        (window.holds(&picture.window) && window.area() <= MOST_PIXELS).then_some(window)
     }
 
     /// Without what differs from run to run: date, seconds, threads, rays, shard.
@@ -130,7 +143,8 @@ fn layer_attributes(picture: &Picture, description: &Description) -> LayerAttrib
         attributes.utc_offset = Some(0.0);
     }
     // What was said of other samples is said anew; a damaged file may have said what none can.
-    let is_about_samples = |name: &[u8]| manifest::is_about(name) || name == PIXEL_HASH.as_bytes();
+    let is_about_samples =
+        |name: &[u8]| manifest::is_about(name) || [PIXEL_HASH, RENDERED].iter().any(|own| name == own.as_bytes());
     // Colours and time codes are shared by all parts, and may not stand among those of one.
     let is_shared =
         |value: &AttributeValue| matches!(value, AttributeValue::Chromaticities(_) | AttributeValue::TimeCode(_));
@@ -139,6 +153,10 @@ fn layer_attributes(picture: &Picture, description: &Description) -> LayerAttrib
         .retain(|name, value| is_sound(name.as_slice()) && !is_about_samples(name.as_slice()) && !is_shared(value));
     attributes.other.extend(own_attributes(description).map(|(name, value)| (text(name), value)));
     attributes
+}
+
+fn bounds(window: Window) -> AttributeValue {
+    AttributeValue::IntegerBounds(IntegerBounds::new((window.x0, window.y0), (window.width(), window.height())))
 }
 
 /// Whether an attribute beside the standard ones can have this name.
@@ -160,6 +178,7 @@ fn own_attributes(description: &Description) -> impl Iterator<Item = (&'static s
         ("samplesPerPixel", description.spp.map(count)),
         ("render/seed", description.seed.map(|seed| AttributeValue::Text(text(&seed.to_string())))),
         ("render/frame", description.frame.map(AttributeValue::I32)),
+        (RENDERED, description.rendered.map(bounds)),
         ("render/seconds", seconds.clone()),
         ("renderTimeSeconds", seconds),
         ("render/threads", run.map(|run| count(run.threads))),

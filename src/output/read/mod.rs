@@ -17,7 +17,7 @@ use super::exr::{Attributes, Storage};
 use crate::film::Picture;
 
 /// Pixels of the largest picture that is read: the largest that a scene may ask for.
-const MOST_PIXELS: usize = 1 << 30;
+pub(super) const MOST_PIXELS: usize = 1 << 30;
 
 /// A file that could not be read as a picture.
 #[derive(Debug, Error)]
