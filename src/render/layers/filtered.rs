@@ -11,9 +11,10 @@ use crate::scene::{Aov, Layers};
 ///
 /// A pixel is a row of eight numbers: x, y, z, red, green, blue, and two to spare. So a packet is turned into rows once,
 /// and each of them is added at one go.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(in crate::render) enum Filtered {
     /// No layer needs them.
+    #[default]
     Unasked,
     /// Of a single sample: the values.
     Single(Vec<[f32; LANES]>),
@@ -83,12 +84,6 @@ impl Filtered {
         };
         let [x, y, z, red, green, blue] = columns.map(|column| Samples::halves(&column));
         [[x, y, z], [red, green, blue]]
-    }
-}
-
-impl Default for Filtered {
-    fn default() -> Self {
-        Filtered::Unasked
     }
 }
 
