@@ -187,6 +187,12 @@ impl Samples8 {
     #[inline(always)]
     pub fn set(&mut self, lane: usize, (x, y): (i32, i32), pattern: PixelPattern, index: u32) {
         (self.x[lane], self.y[lane], self.index[lane]) = (x, y, index);
+        self.set_pattern(lane, pattern);
+    }
+
+    /// Sets the pattern of the pixel of one sample.
+    #[inline(always)]
+    pub fn set_pattern(&mut self, lane: usize, pattern: PixelPattern) {
         self.key[lane] = pattern.key;
         self.pattern.set(lane, pattern.filter);
     }

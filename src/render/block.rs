@@ -145,10 +145,31 @@ impl Block {
         let draws = R::ON || rays.draws() || direct.draws();
         let (mut batch, mut blank_samples) = (Batch::default(), 0);
         let edge = window.width().max(window.height()).next_power_of_two() as u32;
-        for code in 0..edge * edge {
+        let mut code = 0;
+        while code < edge * edge {
             let (x, y) = (window.x0 + compact(code), window.y0 + compact(code >> 1));
+            if range.len() == 1
+                && code % LANES as u32 == 0
+                && batch.count % LANES == 0
+                && let Some(first) = whole_packet(window, frame, (x, y))
+                && coverage.is_none_or(|coverage| coverage.sees_packet(x, y))
+            {
+                if code % 32 == 0 && stop() {
+                    return None;
+                }
+                batch.sees = true;
+                let pattern = |x, y| if draws { rays.pattern(x, y) } else { PixelPattern::default() };
+                batch.push_pixels((x, y), pattern, range.start, (first, frame.width()));
+                if batch.count == WAVE {
+                    work.tile(&mut batch);
+                    batch.sees = false;
+                }
+                code += LANES as u32;
+                continue;
+            }
+            code += 1;
             let Some(index) = window.index(x, y).and_then(|_| frame.index(x, y)) else { continue };
-            if code % 32 == 0 && stop() {
+            if code % 32 == 1 && stop() {
                 return None;
             }
             let sees = coverage.is_none_or(|coverage| coverage.sees(x, y));
@@ -357,6 +378,27 @@ impl Batch {
         samples.start + count as u32
     }
 
+    /// Adds one sample of each of the eight pixels of a packet, whose first one is at `place`, and at `first` among the
+    /// pixels of a frame of this width. No packet may be begun.
+    #[inline(always)]
+    fn push_pixels(
+        &mut self,
+        (x, y): (i32, i32),
+        pattern: impl Fn(i32, i32) -> PixelPattern,
+        sample: u32,
+        (first, width): (usize, usize),
+    ) {
+        let samples = &mut self.samples[self.count / LANES];
+        samples.x = PACKET.map(|(right, _)| x + right);
+        samples.y = PACKET.map(|(_, down)| y + down);
+        samples.index = [sample; LANES];
+        for lane in 0..LANES {
+            samples.set_pattern(lane, pattern(samples.x[lane], samples.y[lane]));
+        }
+        self.pixels.push(PACKET.map(|(right, down)| (first + down as usize * width + right as usize) as u32));
+        self.count += LANES;
+    }
+
     fn samples(&self) -> impl Iterator<Item = (i32, i32, u32)> {
         let lane = |k: usize| (&self.samples[k / LANES], k % LANES);
         (0..self.count).map(lane).map(|(samples, i)| (samples.x[i], samples.y[i], samples.index[i]))
@@ -399,6 +441,14 @@ impl Batch {
             }
         }
     }
+}
+
+/// The pixels of a packet as a Z curve meets them: 4 x 2.
+const PACKET: [(i32, i32); LANES] = [(0, 0), (1, 0), (0, 1), (1, 1), (2, 0), (3, 0), (2, 1), (3, 1)];
+
+/// Where the first pixel of a packet is in a frame, if all of the packet lies in the window.
+fn whole_packet(window: Window, frame: Window, (x, y): (i32, i32)) -> Option<usize> {
+    window.index(x + 3, y + 1).and_then(|_| frame.index(x, y))
 }
 
 /// The even bits of a number, side by side.

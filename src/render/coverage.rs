@@ -50,6 +50,12 @@ impl Coverage {
             || self.cells.get(row.wrapping_mul(self.width).wrapping_add(column)).is_none_or(|cell| *cell)
     }
 
+    /// Whether rays of each of the 4 x 2 pixels from one on may meet anything.
+    #[inline(always)]
+    pub fn sees_packet(&self, x: i32, y: i32) -> bool {
+        [(0, 0), (3, 0), (0, 1), (3, 1)].into_iter().all(|(right, down)| self.sees(x + right, y + down))
+    }
+
     fn rows(&mut self, [x0, y0, x1, y1]: [usize; 4]) -> impl Iterator<Item = &mut [bool]> {
         self.cells.chunks_mut(self.width).take(y1).skip(y0).map(move |row| &mut row[x0..x1])
     }
