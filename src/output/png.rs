@@ -97,7 +97,7 @@ fn samples<const BYTES: usize>(
     color_code: impl Fn(f32, i32, i32) -> [u8; BYTES] + Sync,
     alpha_code: impl Fn(f32) -> [u8; BYTES] + Sync,
 ) -> (ColorType, Losses, Vec<u8>) {
-    let opaque = picture.pixels.par_iter().all(|pixel| f16::from_f32(pixel[3]) >= f16::ONE);
+    let opaque = picture.pixels.par_iter().all(|pixel| pixel[3] >= 1.0 || f16::from_f32(pixel[3]) >= f16::ONE);
     let channels = if opaque { 3 } else { 4 };
     let window = picture.window;
     let mut samples = vec![0; picture.pixels.len() * BYTES * channels];
@@ -105,7 +105,7 @@ fn samples<const BYTES: usize>(
         let mut losses = Losses::default();
         let pixels = &picture.pixels[y * window.width()..][..window.width()];
         for ((x, pixel), codes) in (window.x0..).zip(pixels).zip(codes.chunks_exact_mut(BYTES * channels)) {
-            let invisible = alpha_code(f16::from_f32(pixel[3]).to_f32()) == [0; BYTES];
+            let invisible = !opaque && alpha_code(f16::from_f32(pixel[3]).to_f32()) == [0; BYTES];
             let color = if invisible { [0.0; 3] } else { straight(pixel) };
             let light = shown.light(color.map(|value| losses.finite(value)));
             for (value, code) in light.into_iter().zip(codes.chunks_exact_mut(BYTES)) {

@@ -71,8 +71,8 @@ struct Table {
 /// `begin[k]` is the smallest float whose code is above `k`; infinite for 255.
 type Begin = [f32; 256];
 
-/// 2^-18 is below 1 / (128 x 255 x 12.92), where the first code 1 of the dithered ones begins.
-const LOWEST: f32 = 1.0 / 262_144.0;
+/// 2^-19 is below 1 / (128 x 255 x 12.92), where the first code 1 of the dithered ones begins: what is less is 0 anywhere.
+const LOWEST: f32 = 1.0 / 524_288.0;
 const SHIFT: u32 = 23 - 7;
 
 impl Table {
@@ -83,7 +83,7 @@ impl Table {
         let whole = begin(1.0);
         let first = LOWEST.to_bits() >> SHIFT;
         let last = 1f32.to_bits() >> SHIFT;
-        let code = (first..last).map(|bucket| {
+        let code = (first..=last).map(|bucket| {
             let smallest = f32::from_bits(bucket << SHIFT);
             whole.partition_point(|&begin| begin <= smallest) as u8
         });
@@ -97,12 +97,9 @@ impl Table {
 
     #[inline]
     fn code(&self, linear: f32, begin: &Begin) -> u8 {
-        if linear >= 1.0 {
-            return 255;
-        }
-        if linear.is_nan() || linear < LOWEST {
-            return 0;
-        }
+        // Without a branch, since pictures go back and forth between black and bright.
+        #[allow(clippy::manual_clamp)] // the greater of NaN and a number is the number, a clamped NaN is NaN
+        let linear = linear.max(LOWEST).min(1.0);
         let mut code = self.code[((linear.to_bits() >> SHIFT) - (LOWEST.to_bits() >> SHIFT)) as usize];
         code += u8::from(linear >= begin[usize::from(code)]);
         code + u8::from(linear >= begin[usize::from(code)])
