@@ -292,11 +292,12 @@ fn atom_styles_of_data_files_are_said_or_refused() {
     }
 }
 
+/// Atoms of version 3 have numbers of any order, and lines go on behind a hyphen.
 #[test]
 fn molecules_of_both_versions_are_read() {
     let v3000 = "ethene\n  x\n\n  0  0  0     0  0            999 V3000\nM  V30 BEGIN CTAB\nM  V30 COUNTS 2 1 0 0 0\n\
-        M  V30 BEGIN ATOM\nM  V30 1 C 0 0 0 0\nM  V30 2 C 1.34 0 0 0\nM  V30 END ATOM\nM  V30 BEGIN BOND\n\
-        M  V30 1 2 1 2\nM  V30 END BOND\nM  V30 END CTAB\nM  END\n$$$$\n";
+        M  V30 BEGIN ATOM\nM  V30 30 C 0 0 0 0\nM  V30 20 C 1.34 0 -\nM  V30 0 0 CHG=-1\nM  V30 END ATOM\nM  V30 BEGIN BOND\n\
+        M  V30 1 2 30 20\nM  V30 END BOND\nM  V30 END CTAB\nM  END\n$$$$\n";
     let v2000 = fs::read_to_string(path("aspirin.sdf")).unwrap();
     let (_folder, path) = file("a.sdf", format!("{v3000}{v2000}"));
     let counts = [1, 2].map(|frame| {

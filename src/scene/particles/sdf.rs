@@ -2,6 +2,8 @@
 //!
 //! Source: BIOVIA, "CTfile formats" (2020), chapters "The connection table" and "SDfiles".
 
+use std::collections::HashMap;
+
 use super::element::Element;
 use super::frame::{Columns, Frame, Kinds, wrong};
 use super::lines::{Lines, Reading, Slip, Words, count, number};
@@ -118,34 +120,50 @@ fn bond(lines: &Lines, pair: [Option<u64>; 2], frame: &mut Frame) -> Reading<()>
     Ok(())
 }
 
-/// The blocks of atoms and bonds of version V3000, whose lines start with `M  V30`.
-fn version_3(lines: &mut Lines, frame: &mut Frame, kinds: &mut Kinds) -> Reading<()> {
-    let mut block = String::new();
+/// A line of version V3000 after its `M  V30`; one that ends with a hyphen goes on in the next.
+fn line_3(lines: &mut Lines) -> Reading<String> {
+    let mut all = String::new();
     loop {
         lines.need("\"M  V30 END CTAB\"")?;
-        let text = lines.text().into_owned();
+        let text = lines.text();
         let Some(rest) = text.strip_prefix("M  V30 ") else {
-            return Err(lines.error(
-                0,
-                "a line of this version must start with \"M  V30\"",
-                format!("{:?}", shorten(&text)),
-            ));
+            let rule = "a line of this version must start with \"M  V30\"";
+            return Err(lines.error(0, rule, format!("{:?}", shorten(&text))));
         };
+        match rest.trim_end().strip_suffix('-') {
+            Some(begun) if all.len() < LONGEST => all.push_str(begun),
+            _ => return Ok(all + rest),
+        }
+    }
+}
+
+/// Longest line that is put together of several, in bytes.
+const LONGEST: usize = 1 << 16;
+
+/// The blocks of atoms and bonds of version V3000. Atoms have numbers of any order there, by which bonds know them.
+fn version_3(lines: &mut Lines, frame: &mut Frame, kinds: &mut Kinds) -> Reading<()> {
+    let (mut block, mut atoms) = (String::new(), HashMap::new());
+    loop {
+        let rest = line_3(lines)?;
         let words: Vec<&str> = rest.split_whitespace().collect();
         match words[..] {
             ["END", "CTAB", ..] => return Ok(()),
             ["BEGIN", name, ..] => block = name.to_owned(),
             ["END", ..] => block.clear(),
-            [_, symbol, x, y, z, ..] if block == "ATOM" => {
+            [name, symbol, x, y, z, ..] if block == "ATOM" => {
                 let place = [x, y, z].map(|word| number(word.as_bytes()));
                 let [Some(x), Some(y), Some(z)] = place else {
-                    return Err(lines.error(0, "a coordinate must be a number", format!("{:?}", shorten(rest))));
+                    return Err(lines.error(0, "a coordinate must be a number", format!("{:?}", shorten(&rest))));
                 };
+                if let Some(number) = count(name.as_bytes()) {
+                    atoms.insert(number, frame.len() as u64 + 1);
+                }
                 let added = add([x, y, z, 0.0], symbol.as_bytes(), frame, kinds);
                 added.ok_or_else(|| lines.error(0, "a molecule must have less than 65536 kinds of atoms", ""))?;
             }
             [_, _, a, b, ..] if block == "BOND" => {
-                bond(lines, [a, b].map(|word| count(word.as_bytes())), frame)?;
+                let atom = |word: &str| atoms.get(&count(word.as_bytes())?).copied();
+                bond(lines, [a, b].map(atom), frame)?;
             }
             _ if block == "ATOM" || block == "BOND" => {
                 let (at, word) = Words::of(lines.line()).last().unwrap_or((0, b""));
