@@ -1,10 +1,21 @@
 #!/bin/bash
-# A Slurm of one node on loopback, from the packages of Debian: lab.sh up|down, as root. SLURM_LAB is its directory.
-# `up` refuses to touch a configuration that it did not write.
+# A Slurm of two nodes on loopback, from the packages of Debian, as root. SLURM_LAB is its directory.
+#   lab.sh up | down           starts and stops it; `up` refuses to touch a configuration that it did not write
+#   lab.sh lose NODE           ends all processes of a node at once, as where the power goes: lab1 or lab2
+#   lab.sh join NODE           starts it again
+# A node is a slurmd in a process namespace of its own, whose processes end with it.
 set -e
 host=$(hostname -s)
 lab=${SLURM_LAB:?the directory of the lab}
 conf=/etc/slurm/slurm.conf
+nodes="lab1 lab2"
+join() {
+  setsid unshare --pid --mount --mount-proc --fork slurmd -D -N "$1" >"$lab/$1.out" 2>&1 &
+  echo $! >"$lab/$1.pid"
+}
+lose() { # the first process of a namespace takes all others with it
+  pkill -KILL -P "$(cat "$lab/$1.pid")" || true
+}
 case $1 in
 up)
   if [ -e $conf ] && ! grep -q '^ClusterName=octraylab$' $conf; then
@@ -14,44 +25,54 @@ up)
   install -d -o munge -g munge -m 755 /run/munge
   install -d -o munge -g munge -m 700 /var/log/munge /var/lib/munge
   munge -n >/dev/null 2>&1 || runuser -u munge -- /usr/sbin/munged
-  mkdir -p "$lab/state" "$lab/spool" /etc/slurm
+  mkdir -p "$lab/state" /etc/slurm
+  cpus=$((($(nproc) + 1) / 2))
   cat >$conf <<C
 ClusterName=octraylab
 SlurmctldHost=$host(127.0.0.1)
 SlurmUser=root
 SlurmctldPidFile=$lab/slurmctld.pid
-SlurmdPidFile=$lab/slurmd.pid
+SlurmdPidFile=$lab/%n.slurmd.pid
 StateSaveLocation=$lab/state
-SlurmdSpoolDir=$lab/spool
+SlurmdSpoolDir=$lab/spool.%n
 SlurmctldLogFile=$lab/slurmctld.log
-SlurmdLogFile=$lab/slurmd.log
+SlurmdLogFile=$lab/%n.log
 CommunicationParameters=NoCtldInAddrAny,NoInAddrAny
 ProctrackType=proctrack/linuxproc
-TaskPlugin=task/affinity
+TaskPlugin=task/none
 MpiDefault=none
 SelectType=select/cons_tres
 SelectTypeParameters=CR_Core
+SlurmdParameters=config_overrides
 ReturnToService=2
 KillWait=5
+SlurmdTimeout=10
 SchedulerParameters=sched_min_interval=100000,requeue_setup_env_fail
-NodeName=$host NodeAddr=127.0.0.1 CPUs=$(nproc) State=UNKNOWN
-PartitionName=main Nodes=$host Default=YES MaxTime=INFINITE State=UP
+NodeName=lab1 NodeHostname=$host NodeAddr=127.0.0.1 Port=17011 CPUs=$cpus State=UNKNOWN
+NodeName=lab2 NodeHostname=$host NodeAddr=127.0.0.1 Port=17012 CPUs=$cpus State=UNKNOWN
+PartitionName=main Nodes=lab1,lab2 Default=YES MaxTime=INFINITE State=UP
 C
   slurmctld
-  slurmd
+  for node in $nodes; do
+    mkdir -p "$lab/spool.$node"
+    join "$node"
+  done
   for _ in $(seq 50); do
-    sinfo -h -o %T 2>/dev/null | grep -qx idle && exit 0
+    [ "$(sinfo -h -N -o %T 2>/dev/null | grep -cx idle)" = 2 ] && exit 0
     sleep 0.2
   done
-  sinfo
+  sinfo -N
   exit 1
   ;;
+lose) lose "$2" ;;
+join) join "$2" ;;
 down)
   scancel -u root || true
   sleep 1
-  for daemon in slurmd slurmctld; do
-    [ -f "$lab/$daemon.pid" ] && kill "$(cat "$lab/$daemon.pid")" || true
+  for node in $nodes; do
+    [ -f "$lab/$node.pid" ] && lose "$node"
   done
+  [ -f "$lab/slurmctld.pid" ] && kill "$(cat "$lab/slurmctld.pid")" || true
   rm -f $conf
   ;;
 esac

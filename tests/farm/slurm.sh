@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
-# Rendering through a real Slurm: frames with a requeued and a killed task, tiles of one picture joined behind the array.
+# Rendering through a real Slurm of two nodes: frames with a requeued and a killed task, frames with a node that is lost in
+# the middle, tiles of one picture joined behind the array.
 # Usage: tests/farm/slurm.sh [OCTRAY]; without OCTRAY the release build of this repository.
 set -uo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 octray=$(realpath "${1:-$here/../../target/release/octray}")
 [ -x "$octray" ] || { echo "$octray is not there: cargo build --release first"; exit 2; }
 [ "$(id -u)" = 0 ] || { echo "passed over: needs root for a Slurm of its own"; exit 0; }
-for program in slurmctld slurmd sbatch munge; do
+for program in slurmctld slurmd sbatch munge unshare; do
   command -v $program >/dev/null || { echo "passed over: $program is not installed (slurmctld slurmd slurm-client munge)"; exit 0; }
 done
 export SLURM_LAB=${TMPDIR:-/tmp}/octray-lab.$$
@@ -14,6 +15,7 @@ work=$SLURM_LAB/work
 mkdir -p "$work" && cd "$work"
 bash "$here/lab.sh" up || { echo "passed over: Slurm does not start here: $(tail -3 "$SLURM_LAB"/*.log)"; exit 0; }
 trap 'bash "$here/lab.sh" down; rm -rf "$SLURM_LAB"' EXIT
+source "$here/../survive/scene.sh"
 failures=0
 fail() { echo "  FAILED: $*"; failures=$((failures + 1)); }
 
@@ -26,46 +28,58 @@ await() {
   fail "job $1 does not end"; squeue; cat ./*.out 2>/dev/null
 }
 
-cat >turn.toml <<T
-format = 1
-[image]
-width = 320
-height = 240
-spp = 64
-[camera]
-type = "pinhole"
-eye = { keys = [[1, [0, 1, 6]], [100, [3, 2, 5]]] }
-target = [0, 0.5, 0]
-vfov = 40
-[materials.clay]
-type = "diffuse"
-[[lights]]
-type = "point"
-position = [3, 5, 4]
-intensity = [90, 90, 90]
-[[shapes]]
-type = "sphere"
-center = [0, 1, 0]
-radius = 1
-material = "clay"
-T
+scene turn 1 320 240
+"$octray" render turn.toml --frames 1-60 --out-dir whole --no-date -q
+
+# $1: its output. Submits turn.sh: `array` and `last` are the jobs.
+submit() {
+  "$octray" farm slurm turn.toml --frames 1-60 --shards 4 --out-dir "$1" -o turn.sh || fail "no script"
+  local said
+  said=$(sh turn.sh) || fail "not submitted"
+  array=$(echo "$said" | sed 's/array \([0-9]*\),.*/\1/') last=$(echo "$said" | sed 's/.*it \([0-9]*\)$/\1/')
+}
+
+# $1: a node, or nothing for any. The tasks that run there, for ten seconds at the most until there are any.
+running() {
+  for _ in $(seq 100); do
+    squeue -h -t R -r -j "$array" ${1:+-w "$1"} -o %F_%K | grep . && return
+    sleep 0.1
+  done
+}
+
+# $1: the output. All frames are there, the same bytes, and nothing else.
+compare() {
+  for file in whole/*.exr; do
+    cmp -s "$file" "$1/${file#whole/}" || fail "${file#whole/} is missing or differs"
+  done
+  [ -z "$(find "$1" -name '.*.tmp')" ] || fail "hidden files are left"
+  "$octray" status "$1" || fail "status"
+}
 
 echo "frames, with a requeued and a killed task"
-"$octray" farm slurm turn.toml --frames 1-60 --shards 4 --out-dir out -o turn.sh || fail "no script"
-said=$(sh turn.sh) || fail "not submitted"
-array=$(echo "$said" | sed 's/array \([0-9]*\),.*/\1/') last=$(echo "$said" | sed 's/.*it \([0-9]*\)$/\1/')
-for _ in $(seq 100); do [ "$(squeue -h -t R -j "$array" | wc -l)" -ge 1 ] && break; sleep 0.1; done
-running=($(squeue -h -t R -r -j "$array" -o %F_%K))
+submit out
+one=$(running lab1 | head -1) other=$(running lab2 | head -1)
 sleep 0.5
-[ ${#running[@]} -ge 1 ] && scontrol requeue "${running[0]}" && echo "  requeued ${running[0]}"
-[ ${#running[@]} -ge 2 ] && scancel "${running[1]}" && echo "  killed ${running[1]}"
+[ -n "$one" ] && scontrol requeue "$one" && echo "  requeued $one" || fail "nothing to requeue"
+[ -n "$other" ] && scancel "$other" && echo "  killed $other" || fail "nothing to kill"
 await "$last"
-"$octray" render turn.toml --frames 1-60 --out-dir whole --no-date -q
-for file in whole/*.exr; do
-  cmp -s "$file" "out/${file#whole/}" || fail "${file#whole/} is missing or differs"
-done
-[ -z "$(find out -name '.*.tmp')" ] || fail "hidden files are left"
-"$octray" status out || fail "status"
+compare out
+
+echo "frames, with a node that is lost in the middle"
+submit lost
+task=$(running lab2 | head -1)
+for _ in $(seq 100); do [ "$(find lost -name '*.exr' 2>/dev/null | wc -l)" -ge 4 ] && break; sleep 0.1; done
+bash "$here/lab.sh" lose lab2
+echo "  lost lab2 with $task on it, $(find lost -name '*.exr' | wc -l) of 60 frames there"
+for _ in $(seq 300); do [ "$(sinfo -h -N -n lab2 -o %t | tr -d '*')" = down ] && break; sleep 0.2; done
+[ "$(sinfo -h -N -n lab2 -o %t | tr -d '*')" = down ] || fail "the node does not count as lost: $(sinfo -h -N)"
+# Its task goes on on the other node, and so does the rest.
+await "$last"
+restarts=$(scontrol show job "$task" | sed -n 's/.*Restarts=\([0-9]*\).*/\1/p')
+[ "${restarts:-0}" -ge 1 ] && echo "  $task was started again, $(scontrol show job "$task" | sed -n 's/^ *NodeList=//p')" || fail "$task was not started again"
+compare lost
+bash "$here/lab.sh" join lab2
+for _ in $(seq 100); do [ "$(sinfo -h -N -n lab2 -o %t)" = idle ] && break; sleep 0.2; done
 
 echo "tiles of one picture, joined"
 "$octray" farm slurm turn.toml --tiles 2x2 --picture one.exr -o one.sh || fail "no script"

@@ -15,32 +15,7 @@ cd "$work"
 failures=0
 fail() { echo "  FAILED: $*"; failures=$((failures + 1)); }
 expect() { [ "$1" = "$2" ] || fail "$3: found $1, not $2"; }
-
-scene() { # NAME RADIUS
-  cat >"$1.toml" <<T
-format = 1
-[image]
-width = 160
-height = 120
-spp = 64
-[camera]
-type = "pinhole"
-eye = { keys = [[1, [0, 1, 6]], [100, [3, 2, 5]]] }
-target = [0, 0.5, 0]
-vfov = 40
-[materials.clay]
-type = "diffuse"
-[[lights]]
-type = "point"
-position = [3, 5, 4]
-intensity = [90, 90, 90]
-[[shapes]]
-type = "sphere"
-center = [0, 1, 0]
-radius = $2
-material = "clay"
-T
-}
+source "$here/scene.sh"
 names() { find "$1" -type f -name "$2" | sed 's|.*/||' | sort; }
 sums() { (cd "$1" && sha256sum ./*.exr); }
 millis() { echo $(($(date +%s%N) / 1000000)); }
