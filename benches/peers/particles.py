@@ -2,11 +2,13 @@
 """Trajectories: octray and Tachyon render the same frames of the same particles.
 
     python3 benches/peers/particles.py [--octray target/release/octray] [--sizes 1000,10000,100000,1000000] [--reps 3]
+                                        [--ovito PYTHON]
 
 N spheres on a jittered lattice wander; 640x480 pixels, one sample each, one point light with shadows, two threads, a PNG a
 frame. octray reads the frames from one XYZ file, all in one process, as `octray render --frames` does; Tachyon takes a scene
 file a frame, which were written before the clock starts, in a process each, as it is made for. Both take turns; the median of
-the runs counts. The pictures of the first frame are compared before. Standard library only; prints Markdown.
+the runs counts. The pictures of the first frame are compared before. With --ovito, a Python
+that has the package of that name, OVITO renders the first frames too (ovito_frames.py). Standard library only; prints Markdown.
 """
 import argparse, json, math, os, random, resource, shutil, subprocess, sys, tempfile, time
 
@@ -94,9 +96,10 @@ def main():
     args = argparse.ArgumentParser()
     args.add_argument('--octray', default='target/release/octray'); args.add_argument('--reps', type=int, default=3)
     args.add_argument('--sizes', default=','.join(map(str, FRAMES)))
+    args.add_argument('--ovito', help='a Python that has the package ovito')
     args = args.parse_args()
     if not shutil.which('tachyon'): sys.exit('tachyon is not installed')
-    print('| particles | frames | octray, frames/s | Tachyon, frames/s | ratio | CPU s a frame | ratio | MiB | same pixels |\n|---|---|---|---|---|---|---|---|---|')
+    print('| particles | frames | octray, frames/s | Tachyon, frames/s | ratio | CPU s a frame | ratio | MiB | same pixels | OVITO, frames/s |\n|---|---|---|---|---|---|---|---|---|---|')
     for size in map(int, args.sizes.split(',')):
         with tempfile.TemporaryDirectory() as folder:
             frames = FRAMES.get(size, max(2, 300_000 // size))
@@ -106,11 +109,20 @@ def main():
             for f in range(frames): write_tachyon(f'{folder}/{f}.dat', frame(places, moves, f), radius)
             ours = [args.octray, 'render', f'{folder}/scene.toml', '--frames', f'1-{frames}', '--name', '{scene}.####.png', '--out-dir', f'{folder}/out', '-t', '2', '--tonemap', 'none', '--no-dither', '-q']
             theirs = [['tachyon', f'{folder}/{f}.dat', '-numthreads', '2', '-format', 'PNG', '-o', f'{folder}/{f}.png'] for f in range(frames)]
-            pairs = [(run(ours), run(*theirs)) for _ in range(args.reps)]
+            rounds = [(run(ours), run(*theirs), ovito(args.ovito, folder, frames, radius)) for _ in range(args.reps)]
+            pairs, others = [turn[:2] for turn in rounds], [turn[2] for turn in rounds if turn[2]]
             (a, b), (p, q) = ([median(pair[k][i] for pair in pairs) for k in (0, 1)] for i in (0, 1))
             ratio, cpu = median(pair[1][0] / pair[0][0] for pair in pairs), median(pair[1][1] / pair[0][1] for pair in pairs)
+            other = '%.2f' % (1 / median(others)) if others else '-'
             memory = ' / '.join('%.0f' % max(pair[k][2] for pair in pairs) for k in (0, 1))
-            print(f'| {size:,} | {frames} | {frames / a:.1f} | {frames / b:.2f} | {ratio:.1f} | {p / frames:.4f} / {q / frames:.4f} | {cpu:.1f} | {memory} | {same(args.octray, folder)} |', flush=True)
+            print(f'| {size:,} | {frames} | {frames / a:.1f} | {frames / b:.2f} | {ratio:.1f} | {p / frames:.4f} / {q / frames:.4f} | {cpu:.1f} | {memory} | {same(args.octray, folder)} | {other} |', flush=True)
+
+def ovito(python, folder, frames, radius):
+    """Seconds a frame, at most six of them; None without OVITO."""
+    if not python: return None
+    script = os.path.join(os.path.dirname(os.path.abspath(__file__)), 'ovito_frames.py')
+    done = subprocess.run([python, script, f'{folder}/traj.xyz', str(min(frames, 6)), str(radius), f'{folder}/ovito'], capture_output=True, text=True)
+    return float(done.stdout.split()[-1]) if done.returncode == 0 else sys.exit(done.stderr)
 
 def same(octray, folder):
     """Share of the pixels of the first frame that are lit in both pictures or dark in both."""
