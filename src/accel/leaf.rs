@@ -175,7 +175,7 @@ impl<const ANY: bool, const CULL: bool> PacketLeaf<'_, ANY, CULL> {
 
 /// Kills lanes.
 #[inline(always)]
-fn end(rays: &mut RayPacket, lanes: Mask8) {
+pub fn end(rays: &mut RayPacket, lanes: Mask8) {
     rays.t_max = lanes.select(float8(f32::NEG_INFINITY), rays.t_max);
     rays.t_min = lanes.select(float8(f32::INFINITY), rays.t_min);
 }

@@ -6,7 +6,7 @@
 //!
 //! Source: Barringer and Akenine-Möller, "Dynamic ray stream traversal", ACM Transactions on Graphics 33(4), 2014.
 
-use super::leaf::LineLeaf;
+use super::leaf::{LineLeaf, end};
 use super::line::Line;
 use super::node::{Child, Content, Node, near_planes};
 use super::stack::{Entry, Stack};
@@ -111,23 +111,24 @@ impl Stream {
         }
     }
 
-    /// Takes over what some rays of a packet of a tile have met since.
+    /// Takes over what some rays of a packet of a tile have met since. Those that any hit ends are not asked again.
     #[inline(always)]
-    pub fn refresh(&mut self, packet: usize, lanes: u32, tile: &Tile, p: usize) {
-        let lines = &mut self.lines[packet * LANES..][..LANES];
-        bits(lanes).for_each(|lane| lines[lane].set(&tile.best(p, lane)));
+    pub fn refresh<const ANY: bool>(&mut self, packet: usize, lanes: u32, tile: &Tile, p: usize) {
+        if !ANY {
+            let lines = &mut self.lines[packet * LANES..][..LANES];
+            bits(lanes).for_each(|lane| lines[lane].set(&tile.best(p, lane)));
+        }
     }
 
     /// Hands back what some rays of a packet have met; with `ANY` those that met something are dead.
     #[inline(always)]
     pub fn hand_back<const ANY: bool>(&self, packet: usize, lanes: u32, tile: &mut Tile, p: usize) {
         let lines = &self.lines[packet * LANES..][..LANES];
-        for lane in bits(lanes) {
-            let best = lines[lane].best();
-            tile.set_best(p, lane, &best);
-            if ANY && best.row != RowRef::MISS {
-                tile.packets[p].t_min.as_mut_array()[lane] = f32::INFINITY;
-            }
+        if ANY {
+            let met = bits(lanes).filter(|lane| lines[*lane].best().row != RowRef::MISS);
+            end(&mut tile.packets[p], Mask8::from_bits(met.map(|lane| 1 << lane).sum()));
+        } else {
+            bits(lanes).for_each(|lane| tile.set_best(p, lane, &lines[lane].best()));
         }
     }
 }

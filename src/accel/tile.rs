@@ -366,7 +366,7 @@ impl<const ANY: bool, const CULL: bool> Packets<'_, ANY, CULL> {
                     touched |= self.tile.meet::<ANY, CULL>(self.tree, leaf, 1 << p, None, counts);
                 }
                 _ if lanes != 0 => {
-                    self.own.stream.refresh(self.own.beams[p].1, lanes, self.tile, p);
+                    self.own.stream.refresh::<ANY>(self.own.beams[p].1, lanes, self.tile, p);
                     self.own.stream.wait(self.own.beams[p].1, lanes);
                     waiting[p] = lanes;
                     touched |= 1 << p;
