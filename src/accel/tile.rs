@@ -229,8 +229,9 @@ impl Tree {
         }
         let bundle = Bundle::new::<ANY>(tile, all);
         let merged = bundle.merged(all);
-        let together = merged.narrow(self.size) != 0;
-        let live = if together { all } else { all & bundle.narrow(self.size) };
+        let narrow = all & bundle.narrow(self.size);
+        let together = merged.together::<ANY>(self.size, narrow == all);
+        let live = if together { all } else { narrow };
         if live != 0 {
             self.walk_together::<ANY, CULL>(&bundle, &merged, live, together, tile, walk);
         }
