@@ -56,6 +56,8 @@ impl BlockWork {
     }
 }
 
+/// After so many camera tiles is asked whether to stop: a few milliseconds, however many samples a pixel has.
+const TILES: u64 = 64;
 /// Camera tiles that are traced before all that goes on from them, so that the tiles of that are full.
 const BATCH: usize = 64;
 
@@ -154,14 +156,14 @@ impl Block {
                 && let Some(first) = whole_packet(window, frame, (x, y))
                 && coverage.is_none_or(|coverage| coverage.sees_packet(x, y))
             {
-                if code % 32 == 0 && stop() {
-                    return None;
-                }
                 batch.sees = true;
                 let pattern = |x, y| if draws { rays.pattern(x, y) } else { PixelPattern::default() };
                 batch.push_pixels((x, y), pattern, range.start, (first, frame.width()));
                 if batch.count == WAVE {
                     work.tile(&mut batch);
+                    if work.tiles.is_multiple_of(TILES) && stop() {
+                        return None;
+                    }
                     batch.sees = false;
                 }
                 code += LANES as u32;
@@ -169,9 +171,6 @@ impl Block {
             }
             code += 1;
             let Some(index) = window.index(x, y).and_then(|_| frame.index(x, y)) else { continue };
-            if code % 32 == 1 && stop() {
-                return None;
-            }
             let sees = coverage.is_none_or(|coverage| coverage.sees(x, y));
             if let (false, Some(blank)) = (sees, &blank) {
                 // So many equal numbers of 24 bits sum up exactly.
@@ -187,6 +186,9 @@ impl Block {
                 sample = batch.push((x, y), pattern, sample..range.end, index);
                 if batch.count == WAVE {
                     work.tile(&mut batch);
+                    if work.tiles.is_multiple_of(TILES) && stop() {
+                        return None;
+                    }
                     batch.sees = sees && sample < range.end;
                 }
             }
