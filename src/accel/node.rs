@@ -100,7 +100,7 @@ impl Node {
     /// Asks for all of it to be brought near.
     #[inline(always)]
     pub fn fetch(&self) {
-        (0..self.columns.len()).step_by(2).for_each(|column| prefetch_index(self.columns, column));
+        (0..self.columns.len()).step_by(2).for_each(|column| prefetch_index(self.columns.as_slice(), column));
     }
 
     /// The leaves among its children.
