@@ -57,7 +57,7 @@ impl BlockWork {
 }
 
 /// After so many camera tiles is asked whether to stop: a few milliseconds, however many samples a pixel has.
-const TILES: u64 = 64;
+const ASK_AFTER: u64 = 64;
 /// Camera tiles that are traced before all that goes on from them, so that the tiles of that are full.
 const BATCH: usize = 64;
 
@@ -161,7 +161,7 @@ impl Block {
                 batch.push_pixels((x, y), pattern, range.start, (first, frame.width()));
                 if batch.count == WAVE {
                     work.tile(&mut batch);
-                    if work.tiles.is_multiple_of(TILES) && stop() {
+                    if work.tiles.is_multiple_of(ASK_AFTER) && stop() {
                         return None;
                     }
                     batch.sees = false;
@@ -186,7 +186,7 @@ impl Block {
                 sample = batch.push((x, y), pattern, sample..range.end, index);
                 if batch.count == WAVE {
                     work.tile(&mut batch);
-                    if work.tiles.is_multiple_of(TILES) && stop() {
+                    if work.tiles.is_multiple_of(ASK_AFTER) && stop() {
                         return None;
                     }
                     batch.sees = sees && sample < range.end;
