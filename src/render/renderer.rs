@@ -156,8 +156,8 @@ impl<'s> Renderer<'s> {
         self
     }
 
-    /// The scene at [moments](super::moments()) while the shutter is open: the samples of each pixel are shared out over them, in order.
-    /// Layers, too, are of what those samples see. Without any the picture is of one moment.
+    /// The scene at [moments](super::moments()) while the shutter is open: the samples of each pixel are shared out over
+    /// them, in order. Layers, too, are of what those samples see. Without any the picture is of one moment.
     pub fn moments(mut self, moments: &'s [Scene]) -> Self {
         self.moments = moments;
         self
