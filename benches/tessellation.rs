@@ -69,9 +69,11 @@ fn row(name: &str, scene: &Scene, rays: &[Ray], truth: &[Option<Hit>]) {
     let packets: Vec<(usize, RayPacket)> =
         rays.chunks(LANES).map(RayPacket::gather).enumerate().step_by(STRIDE).collect();
     let brute = || tree.stores().visit(kind, Brute(&packets));
-    // The same answers, up to rays through an edge, which only the tree's leaves settle by the rule for ties.
+    // The same answers, up to rays through an edge, which only the tree's leaves settle by the rule for ties; places of
+    // hits are from f64, those of the kernel from f32.
+    let differ = |a: f32, b: f32| a != b && (a - b).abs() > 1e-5 * b.abs();
     let different =
-        brute().into_iter().filter(|(at, t)| (0..LANES).any(|i| t.as_array()[i] != place(&hits[at * LANES + i])));
+        brute().into_iter().filter(|(at, t)| (0..LANES).any(|i| differ(t.as_array()[i], place(&hits[at * LANES + i]))));
     assert!(different.count() * 100 <= packets.len(), "{name}");
     let seconds = median(|| drop(std::hint::black_box(brute())));
     let each = seconds / (packets.len() * LANES) as f64;
