@@ -5,8 +5,8 @@
 //! shows is settled by the scene and by [`Settings`]; a picture is the same to the bit alone and in a batch.
 //!
 //! Data goes through four stages that overlap: a scene is read once for all jobs that share it, its picture is traced
-//! (small ones one a core, large ones by all cores), encoded on the core that finished it, and written by a thread of
-//! its own, which makes files durable in groups.
+//! (small ones one a core, large ones by all cores), encoded (the rows of an EXR as soon as their blocks are there, all else
+//! on the core that finished the picture), and written by a thread of its own, which makes files durable in groups.
 
 mod annotate;
 mod checkpoint;
@@ -30,4 +30,4 @@ pub use self::choice::{LayerChoice, Overscan, Tile, WindowChoice};
 pub use self::job::{Job, Settings, Shard, View, stem};
 pub use self::run::{Options, Summary, run};
 pub use self::source::Sources;
-pub use self::watch::{Event, JobError, Report, Watch};
+pub use self::watch::{Event, Fresh, JobError, Report, Watch};

@@ -19,9 +19,10 @@ use super::checkpoint::{Checkpoint, Saves};
 use super::memory;
 use super::source::{Shared, Ticket};
 use super::write::{Finished, Room, Writer, line};
-use super::{Event, Job, JobError, Report, Shard, Sources, Watch, annotate, existing, ledger};
-use crate::output::exr::Encoded;
-use crate::output::{self, Format, OutputError, aside};
+use super::{Event, Fresh, Job, JobError, Report, Shard, Sources, Watch, annotate, existing, ledger};
+use crate::film::Picture;
+use crate::output::exr::{Encoded, Packer};
+use crate::output::{self, EncodeError, Format, OutputError, aside};
 use crate::render::{RenderError, Renderer, Rendering, Task, moments, pool};
 use crate::scene::inputs::{Hashes, hex, sha256};
 use crate::scene::{Aov, Scene};
@@ -65,8 +66,16 @@ pub struct Summary {
     pub cancelled: bool,
 }
 
-/// A picture, what its file says of it, and what is seen where, if that is asked for.
-type Pictured = (Rendering, output::Description, Option<(PathBuf, Vec<u8>)>);
+/// A picture that was traced.
+struct Pictured {
+    rendering: Rendering,
+    /// What its file says of it.
+    description: output::Description,
+    /// What is seen where, if that is asked for.
+    annotations: Option<(PathBuf, Vec<u8>)>,
+    /// Its file, where it was packed as it was traced, and what of the time went there.
+    packed: Option<(Packer, f64)>,
+}
 
 /// A batch on its way.
 struct Batch<'a> {
@@ -231,23 +240,28 @@ impl Batch<'_> {
         if is_new {
             scene.warnings.iter().for_each(|warning| self.warn(index, warning.to_string()));
         }
-        let Some((mut rendering, mut description, annotations)) = self.picture(index, &shared)? else {
+        let Some(pictured) = self.picture(index, &shared)? else {
             self.skip(index);
             return Ok(());
         };
-        if scene.background.transparent && !job.settings.windows.is_crop() && job.format == Format::Exr {
-            description.rendered = rendering.picture.trim();
+        let Pictured { mut rendering, mut description, annotations, packed } = pictured;
+        if packed.is_none() {
+            if is_trimmed(job, scene) {
+                description.rendered = rendering.picture.trim();
+            }
+            self.watch.event(&Event::Traced(index, job, &rendering));
         }
-        self.watch.event(&Event::Traced(index, job, &rendering));
-        let encoding = Instant::now();
-        let encoded = output::encode(job.format, &rendering.picture, job.settings.options, &description);
-        let Encoded { bytes, losses, beside } =
-            encoded.map_err(|error| JobError::Encode { path: job.output.clone(), error })?;
+        let (encoding, pack_seconds) = (Instant::now(), packed.as_ref().map_or(0.0, |(_, seconds)| *seconds));
+        let encoded = match packed {
+            Some((packer, _)) => packer.finish(&rendering.picture.cryptomattes, &description),
+            None => output::encode(job.format, &rendering.picture, job.settings.options, &description),
+        };
+        let Encoded { bytes, losses, beside } = encoded.map_err(|error| encode_error(job, error))?;
         let hash = self.ledgers.as_ref().map(|_| sha256(&mut bytes.as_slice()).map(|hash| hex(&hash)));
         let hash = hash.and_then(Result::ok).unwrap_or_default();
         let report = Report {
             load_seconds,
-            write_seconds: encoding.elapsed().as_secs_f64(),
+            write_seconds: pack_seconds + encoding.elapsed().as_secs_f64(),
             window: Some(rendering.picture.window),
             spp: description.spp.unwrap_or_default(),
             stats: rendering.stats,
@@ -304,13 +318,29 @@ impl Batch<'_> {
         let stopped = || self.stopped();
         let saves = self.options.checkpoint.as_ref();
         let saves = saves.map(|to| Saves::new(to, format!("{scene_hash} {}", ledger::settings_hash(job))));
+        let packer = self.packer(job, scene, &task)?;
+        let pack = |rows: &Picture| packer.iter().for_each(|packer| packer.pack(rows));
         let mut unfinished = match &saves {
+            None if packer.is_some() => task.begin_hollow(),
             None => task.begin(),
             Some(saves) => saves.open(&task).map_err(|reason| JobError::Checkpoint { path: saves.path(), reason })?,
         };
         let done = unfinished.done();
         let blocks: Vec<usize> = (0..task.blocks()).filter(|block| !done[*block]).collect();
-        let gathering = unfinished.open(&task);
+        let gathering = match &packer {
+            Some(packer) => unfinished.pass(&task, packer.rows(), &pack),
+            None => unfinished.open(&task),
+        };
+        let so_far = |name: &Path| {
+            let partial = packer.as_ref().map(|packer| packer.so_far(gathering.waiting())).transpose()?;
+            let Rendering { picture, stats, .. } = task.finish(gathering.so_far(), 0, Instant::now());
+            let file_stem = output::stem(name);
+            let description = output::Description { file_stem, ..job.description(&renderer, &stats, None, None) };
+            match partial {
+                Some(packer) => packer.finish(&picture.cryptomattes, &description),
+                None => output::encode(job.format, &picture, job.settings.options, &description),
+            }
+        };
         let trace = |block| {
             let samples = task.samples(block);
             self.large.fetch_sub(samples, Ordering::Relaxed);
@@ -319,7 +349,8 @@ impl Batch<'_> {
                 return None;
             }
             let traced = task.trace(block, &stopped)?;
-            gathering.show(&traced, |shown| self.watch.event(&Event::Block(index, job, &renderer, shown)));
+            let (window, pixels) = task.pixels(&traced);
+            self.watch.event(&Event::Block(index, job, &renderer, &Fresh { window, pixels, so_far: &so_far }));
             gathering.add(traced);
             self.advance(samples as f64 / total as f64, index);
             if let Some(Err(error)) = saves.as_ref().map(|saves| saves.write_if_due(&gathering)) {
@@ -335,6 +366,8 @@ impl Batch<'_> {
         drop(gathering);
         traced.ok_or(JobError::Cancelled)?;
         let mut rendering = task.finish(unfinished, self.threads, start);
+        let apart = packer.as_ref().map_or(0.0, |packer| rendering.stats.set_apart(packer.seconds()));
+        let packed = packer.map(|packer| (packer, apart));
         let annotations = self.options.annotations.then(|| {
             let page = annotate::page(job, &renderer, scene, &rendering.picture, &rendering.names);
             (job.output.with_extension("json"), page.into_bytes())
@@ -344,7 +377,18 @@ impl Batch<'_> {
         }
         let shard = self.options.shard.map(|shard| shard.to_string());
         let description = job.description(&renderer, &rendering.stats, Some(scene_hash), shard);
-        Ok(Some((rendering, description, annotations)))
+        Ok(Some(Pictured { rendering, description, annotations, packed }))
+    }
+
+    /// What packs the rows of an EXR as they are traced; `None` where the whole picture is needed in the end: to find what of
+    /// it is to be written, for what is told beside it, or for a checkpoint.
+    fn packer(&self, job: &Job, scene: &Scene, task: &Task) -> Result<Option<Packer>, JobError> {
+        let is_whole = is_trimmed(job, scene) || self.options.annotations || self.options.checkpoint.is_some();
+        if job.format != Format::Exr || is_whole || !task.passes() {
+            return Ok(None);
+        }
+        let packer = Packer::new(&task.hollow(), job.settings.options.exr);
+        packer.map(Some).map_err(|error| encode_error(job, error))
     }
 
     /// The moments that a picture is blurred over; none where nothing moves.
@@ -451,6 +495,15 @@ impl Batch<'_> {
         let all = (done as f64 / 1e6 / self.jobs.len() as f64).min(1.0);
         self.watch.event(&Event::Progress(all, index, &self.jobs[index]));
     }
+}
+
+/// Whether its file leaves out edges that show nothing.
+fn is_trimmed(job: &Job, scene: &Scene) -> bool {
+    scene.background.transparent && !job.settings.windows.is_crop() && job.format == Format::Exr
+}
+
+fn encode_error(job: &Job, error: EncodeError) -> JobError {
+    JobError::Encode { path: job.output.clone(), error }
 }
 
 fn mib(bytes: u64) -> u64 {

@@ -1,13 +1,13 @@
 //! What a batch tells while it goes on.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
 use super::Job;
 use crate::film::Window;
-use crate::output::{EncodeError, Losses, OutputError};
-use crate::render::{IdNames, RenderError, Renderer, Rendering, Shown, Stats};
+use crate::output::{EncodeError, Encoded, Losses, OutputError};
+use crate::render::{IdNames, RenderError, Renderer, Rendering, Stats};
 use crate::scene::SceneErrors;
 
 /// Told how a batch goes on, and asked whether it is to go on. Called from any thread.
@@ -34,8 +34,8 @@ pub enum Event<'a> {
     /// So much of all jobs is done, 0..1, and work on this one was the last.
     Progress(f64, usize, &'a Job),
     /// A block of a job's picture was traced and is about to be put among those before.
-    Block(usize, &'a Job, &'a Renderer<'a>, &'a Shown<'a>),
-    /// The picture of a job is there, but not written yet.
+    Block(usize, &'a Job, &'a Renderer<'a>, &'a Fresh<'a>),
+    /// The picture of a job is there, but not written yet: told of those that are kept until then.
     Traced(usize, &'a Job, &'a Rendering),
     /// The file of a job has its name.
     FrameDone(usize, &'a Job, &'a Report),
@@ -47,6 +47,16 @@ pub enum Event<'a> {
     Warning(usize, &'a Job, String),
     /// A job failed; the others go on.
     Error(usize, &'a Job, &'a JobError),
+}
+
+/// A block that was traced, for those who look on.
+pub struct Fresh<'a> {
+    /// Where it lies.
+    pub window: Window,
+    /// Its colour, row by row.
+    pub pixels: &'a [[f32; 4]],
+    /// Makes a file of this name of the blocks before it.
+    pub so_far: &'a dyn Fn(&Path) -> Result<Encoded, EncodeError>,
 }
 
 /// How a picture came about.

@@ -7,8 +7,8 @@ use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum};
 use octray::film::Picture;
 use octray::output::{
-    self, Bits, Coding, Compression, Description, Display, Format, Losses, Options, OutputError, Storage, ToneMap,
-    aside,
+    self, Bits, Coding, Compression, Description, Display, EncodeError, Encoded, Format, Losses, Options, OutputError,
+    Storage, ToneMap, aside,
 };
 
 use super::Run;
@@ -212,8 +212,13 @@ pub fn write(
         Target::Stdout => None,
     };
     let description = Description { file_stem: name, ..description.clone() };
-    let encoded = output::encode(target.format(), picture, options, &description)
-        .map_err(|error| Failure::new(Exit::Output, format!("{target}: cannot be encoded: {error}")))?;
+    put(output::encode(target.format(), picture, options, &description), target, run)
+}
+
+/// Writes an encoded picture, and says what the format could not hold.
+pub fn put(encoded: Result<Encoded, EncodeError>, target: &Target, run: &Run) -> Result<(), Failure> {
+    let encoded =
+        encoded.map_err(|error| Failure::new(Exit::Output, format!("{target}: cannot be encoded: {error}")))?;
     match target {
         Target::File(path, _) => {
             for file in &encoded.beside {

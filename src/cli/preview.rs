@@ -9,10 +9,9 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use octray::Renderer;
-use octray::batch::Job;
+use octray::batch::{Fresh, Job};
 use octray::film::Window;
 use octray::output::Format;
-use octray::render::{Rendering, Shown};
 use tev_client::{PacketCreateImage, PacketUpdateImage, TevClient};
 
 use super::Run;
@@ -36,12 +35,12 @@ impl<'a> Preview<'a> {
     }
 
     /// Shows a block, and writes what there is so far where SIGUSR1 came.
-    pub fn block(&self, job: &Job, renderer: &Renderer, shown: &Shown) {
+    pub fn block(&self, job: &Job, renderer: &Renderer, fresh: &Fresh) {
         if let Some(tev) = self.tev.get_or_init(|| self.open(job, renderer)) {
-            tev.show(shown.window, shown.pixels);
+            tev.show(fresh.window, fresh.pixels);
         }
         if self.run.signals.is_asked() {
-            self.write(job, renderer, &(shown.so_far)());
+            self.write(job, fresh);
         }
     }
 
@@ -55,16 +54,14 @@ impl<'a> Preview<'a> {
     }
 
     /// Writes what there is so far beside the target, whose own name stays that of a whole picture.
-    fn write(&self, job: &Job, renderer: &Renderer, unfinished: &Rendering) {
+    fn write(&self, job: &Job, fresh: &Fresh) {
         let ending = if job.format == Format::Exr { "partial.exr" } else { "partial.png" };
         let name = match job.output.as_os_str() == "-" {
             true => PathBuf::from("octray.partial.exr"),
             false => job.output.with_extension(ending),
         };
-        let description = job.description(renderer, &unfinished.stats, None, None);
-        let written = Target::new(&name, &[&job.scene], self.run).and_then(|target| {
-            pictures::write(&unfinished.picture, &target, job.settings.options, &description, self.run)
-        });
+        let target = Target::new(&name, &[&job.scene], self.run);
+        let written = target.and_then(|target| pictures::put((fresh.so_far)(&name), &target, self.run));
         match written {
             Ok(()) => self.run.console.note(&format!("{}: the picture so far", name.display())),
             Err(failure) => self.run.console.warn(&failure.message),

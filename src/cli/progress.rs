@@ -184,9 +184,9 @@ impl Watch for Teller<'_> {
                 }));
             }
             Event::Progress(done, _, job) => self.progress(*done, job),
-            Event::Block(_, job, renderer, shown) => {
+            Event::Block(_, job, renderer, fresh) => {
                 if let Some(preview) = &self.preview {
-                    preview.block(job, renderer, shown);
+                    preview.block(job, renderer, fresh);
                 }
             }
             Event::Traced(index, job, rendering) => {

@@ -42,6 +42,12 @@ impl Picture {
         }
         bands
     }
+
+    /// All of the picture as one band.
+    pub fn band(&mut self) -> Band<'_> {
+        let channels = self.channels.iter_mut().map(|channel| Strip::of(&mut channel.samples)).collect();
+        Band { window: self.window, pixels: &mut self.pixels, channels }
+    }
 }
 
 impl Band<'_> {

@@ -104,6 +104,20 @@ impl Picture {
         Picture { display, window, pixels, channels: Vec::new(), cryptomattes: Vec::new() }
     }
 
+    /// What it is a picture of, without a sample: windows, names and types. Nothing that is whole.
+    pub fn hollow(&self) -> Self {
+        let channel =
+            |channel: &Channel| Channel { name: channel.name.clone(), samples: channel.samples.kind().zeros(0) };
+        let matte = |matte: &Cryptomatte| Cryptomatte { name: matte.name.clone(), manifest: Default::default() };
+        Picture {
+            display: self.display,
+            window: self.window,
+            pixels: Plane::default(),
+            channels: self.channels.iter().map(channel).collect(),
+            cryptomattes: self.cryptomattes.iter().map(matte).collect(),
+        }
+    }
+
     /// The layer channel of this full name, `depth.Z`.
     pub fn channel(&self, name: &str) -> Option<&Channel> {
         self.channels.iter().find(|channel| channel.name == name)

@@ -6,6 +6,7 @@ mod coverage;
 mod frame;
 mod gather;
 mod layers;
+mod passing;
 mod query;
 mod reference;
 mod renderer;

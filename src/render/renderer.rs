@@ -46,7 +46,7 @@ pub struct Renderer<'s> {
 /// A picture and how it came about.
 #[derive(Debug, Clone)]
 pub struct Rendering {
-    /// The picture.
+    /// The picture; without samples where its rows were passed on.
     pub picture: Picture,
     /// Work and time.
     pub stats: Stats,

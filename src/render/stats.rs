@@ -17,6 +17,8 @@ pub struct Stats {
     pub build_seconds: f64,
     /// Tracing and shading.
     pub trace_seconds: f64,
+    /// The same of all threads together, by themselves.
+    pub(super) busy_seconds: f64,
     /// Rays by kind.
     pub rays: RayCounts,
     /// Box and primitive tests.
@@ -45,6 +47,13 @@ impl Stats {
         self.column_bytes += other.column_bytes;
         self.tree_bytes += other.tree_bytes;
         self
+    }
+
+    /// Takes out of the time of tracing what threads did in between, in seconds of all threads: its share.
+    pub fn set_apart(&mut self, seconds: f64) -> f64 {
+        let apart = self.trace_seconds * seconds / (self.busy_seconds + seconds).max(f64::MIN_POSITIVE);
+        self.trace_seconds -= apart;
+        apart
     }
 
     pub(super) fn add(&mut self, work: &BlockWork) {

@@ -3,6 +3,7 @@
 //! [`Renderer::render`] gives all blocks to the threads of one pool; a batch hands out those of several pictures.
 
 use std::ops::Range;
+use std::time::Instant;
 
 use super::adaptive::{Effort, Noise, Spent};
 use super::block::{Block, BlockWork};
@@ -10,7 +11,7 @@ use super::layers::{LayerPlan, LayerTape, LayerWork};
 use super::reference::{RowWork, Rows};
 use super::tiles::{TileWork, Tiles};
 use super::{Engine, Frame, RenderError, Renderer, Stats, shutter};
-use crate::film::{Picture, Window};
+use crate::film::{Picture, Plane, Window};
 use crate::integrate::{Record, Silent};
 use crate::plan::Skip;
 use crate::scene::{Aov, Layers};
@@ -44,6 +45,8 @@ pub struct Traced {
     /// Which one, from 0.
     pub(super) block: usize,
     part: Part,
+    /// What it took.
+    pub(super) seconds: f64,
 }
 
 #[derive(Debug)]
@@ -130,6 +133,7 @@ impl<'s> Task<'s> {
 
     /// Traces a block, counted from 0, on this thread; `None` where `stop` asked for that within.
     pub fn trace(&self, block: usize, stop: &(dyn Fn() -> bool + Sync)) -> Option<Traced> {
+        let start = Instant::now();
         let part = match &self.work {
             Work::Blocks(frames, blocks) => {
                 let place = blocks[block];
@@ -138,7 +142,7 @@ impl<'s> Task<'s> {
             Work::Rows(rows) => Part::Row(rows.trace(block, self.layers.as_ref(), stop)?),
             Work::Tiles(tiles) => Part::Tile(tiles.trace(block, stop)?),
         };
-        Some(Traced { block, part })
+        Some(Traced { block, part, seconds: start.elapsed().as_secs_f64() })
     }
 
     /// Where a block lies, and its colour row by row.
@@ -243,11 +247,24 @@ impl<'s> Task<'s> {
 
     /// Its picture without any block: all channels that were asked for, and nothing in them.
     pub(super) fn blank(&self) -> Picture {
-        let mut picture = Picture::new(self.display, self.window);
-        if let Some(plan) = self.asked() {
-            plan.open(&mut picture);
-        }
+        self.opened(Picture::new(self.display, self.window))
+    }
+
+    /// What its picture is one of, without a sample.
+    pub fn hollow(&self) -> Picture {
+        let pixels = Plane::default();
+        let (channels, cryptomattes) = (Vec::new(), Vec::new());
+        self.opened(Picture { display: self.display, window: self.window, pixels, channels, cryptomattes })
+    }
+
+    fn opened(&self, mut picture: Picture) -> Picture {
+        self.asked().into_iter().for_each(|plan| plan.open(&mut picture));
         picture
+    }
+
+    /// Whether its rows can be passed on as they come: what pixels cost is found for whole blocks, and sorted out in the end.
+    pub fn passes(&self) -> bool {
+        self.asked().is_none_or(|plan| !plan.layers.has(Aov::Cost))
     }
 
     /// What is known before the first block.

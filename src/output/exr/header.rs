@@ -70,7 +70,7 @@ impl Attributes {
 /// Sizes beyond those of the format.
 pub(super) fn headers(
     picture: &Picture,
-    parts: &[Part<'_>],
+    parts: &[Part],
     storage: Storage,
     description: &Description,
     manifests: &[Manifest],
@@ -78,7 +78,7 @@ pub(super) fn headers(
     let shared = image_attributes(picture, storage, description)?;
     let own = layer_attributes(picture, description);
     let size = Vec2(picture.window.width(), picture.window.height());
-    let header = |part: &Part<'_>| {
+    let header = |part: &Part| {
         let mut own = own.clone();
         own.layer_name = (parts.len() > 1).then(|| text(&part.name));
         for manifest in manifests.iter().filter(|manifest| manifest.is_of(part)) {

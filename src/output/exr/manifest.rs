@@ -4,7 +4,7 @@
 //! `manifest` or `manif_file`. A manifest is JSON, names in raw UTF-8: readers do not all know `\u` escapes.
 
 use super::layout::Part;
-use crate::film::{Cryptomatte, Picture};
+use crate::film::Cryptomatte;
 
 /// Manifests longer than this stand in a file of their own: long headers make compositors slow.
 const MOST_BYTES: usize = 1 << 20;
@@ -29,15 +29,15 @@ pub struct Beside {
     pub bytes: Vec<u8>,
 }
 
-/// The manifests of a picture. `stem` is the name of its file without extension, after which files beside it are
+/// The manifests of a picture's Cryptomattes. `stem` is the name of its file without extension, after which files beside it are
 /// named; without one, all stand inside.
-pub(super) fn manifests<'a>(picture: &'a Picture, beside: bool, stem: Option<&str>) -> Vec<Manifest<'a>> {
+pub(super) fn manifests<'a>(mattes: &'a [Cryptomatte], beside: bool, stem: Option<&str>) -> Vec<Manifest<'a>> {
     let one = |matte: &'a Cryptomatte| {
         let json = json(matte);
         let file = stem.filter(|_| beside || json.len() > MOST_BYTES);
         Manifest { matte, json, file: file.map(|stem| format!("{stem}.{}.json", matte.name)) }
     };
-    picture.cryptomattes.iter().map(one).collect()
+    mattes.iter().map(one).collect()
 }
 
 /// Whether an attribute of this name is of a Cryptomatte.
@@ -47,13 +47,13 @@ pub(in crate::output) fn is_about(name: &[u8]) -> bool {
 
 impl Manifest<'_> {
     /// Whether the channels of the part are what it names.
-    pub fn is_of(&self, part: &Part<'_>) -> bool {
+    pub fn is_of(&self, part: &Part) -> bool {
         let prefix = self.matte.name.as_str();
         let is_rank = |name: &str| {
             let rank = name.strip_prefix(prefix).and_then(|rest| rest.split_once('.'));
             rank.is_some_and(|(rank, _)| !rank.is_empty() && rank.bytes().all(|digit| digit.is_ascii_digit()))
         };
-        part.channels.iter().any(|channel| is_rank(channel.name))
+        part.channels.iter().any(|channel| is_rank(&channel.name))
     }
 
     pub fn attributes(&self) -> impl Iterator<Item = (String, String)> {

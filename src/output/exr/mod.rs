@@ -8,27 +8,19 @@
 mod header;
 mod layout;
 mod manifest;
+mod packer;
 mod sort;
 mod zip;
 
-use std::io::Cursor;
-
-use exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock};
-use exr::block::writer::ChunksWriter;
-use exr::block::{BlockIndex, UncompressedBlock};
-use exr::meta::MetaData;
-use exr::meta::attribute::{AttributeValue, Text};
-use exr::meta::header::Header;
-use rayon::prelude::*;
+use exr::meta::attribute::Text;
 
 pub use self::header::Attributes;
 pub(super) use self::header::PIXEL_HASH;
 pub use self::manifest::Beside;
 pub(super) use self::manifest::is_about as is_about_mattes;
+pub use self::packer::Packer;
 
-use self::layout::Part;
-use super::color::{self, Primaries};
-use super::pixel_hash::{Digests, PixelHash};
+use super::color::Primaries;
 use super::{Description, EncodeError, Losses};
 use crate::film::Picture;
 
@@ -152,108 +144,9 @@ pub struct Encoded {
 /// without a name or with one name.
 pub fn encode(picture: &Picture, storage: Storage, description: &Description) -> Result<Encoded, EncodeError> {
     EncodeError::unless_whole(picture)?;
-    let matrix = Primaries::REC709.matrix_to(storage.primaries()).filter(|_| storage.color != ColorSpace::Rec709);
-    let picture = &*color::converted(picture, matrix.unwrap_or_default());
-    let parts = layout::parts(picture, storage)?;
-    let manifests = manifest::manifests(picture, storage.sidecar, description.file_stem.as_deref());
-    let mut headers = header::headers(picture, &parts, storage, description, &manifests)?;
-    MetaData::validate(&headers, true).map_err(EncodeError::new)?;
-    let packed = pack(picture, &parts, &headers)?;
-    let hash = hash(picture, &parts, &packed);
-    headers[0].own_attributes.other.insert(text(PIXEL_HASH), AttributeValue::Text(text(&hash)));
-    let bytes = file(headers, packed)?;
-    let channels = parts.par_iter().flat_map(|part| part.channels.par_iter());
-    let losses = channels.map(|channel| channel.source.losses()).reduce(Losses::default, Losses::and);
-    Ok(Encoded { bytes, losses, beside: manifests.into_iter().filter_map(manifest::Manifest::beside).collect() })
-}
-
-/// A chunk of a file, its place among those of its part, and the digests of its rows, one a channel.
-struct Packed {
-    index: usize,
-    chunk: Chunk,
-    digests: Vec<Digests>,
-}
-
-/// Fills, hashes and compresses all chunks, each by itself.
-fn pack(picture: &Picture, parts: &[Part<'_>], headers: &[Header]) -> Result<Vec<Packed>, EncodeError> {
-    let meta = MetaData {
-        requirements: MetaData::validate(headers, false).map_err(EncodeError::new)?,
-        headers: headers.iter().cloned().collect(),
-    };
-    let blocks: Vec<(usize, BlockIndex)> = meta.enumerate_ordered_header_block_indices().collect();
-    let one = |(index, block): (usize, BlockIndex)| {
-        let (part, header) = (&parts[block.layer], &headers[block.layer]);
-        let block = UncompressedBlock { index: block, data: rows(picture, part, header, block) };
-        let exact = !header.compression.may_loose_data();
-        let mut digests = if exact { digest(part, header, &block) } else { Vec::new() };
-        let chunk = chunk(block, headers)?;
-        if !exact {
-            // The hash is of what a reader finds.
-            let back = UncompressedBlock::decompress_chunk(chunk.clone(), &meta, true).map_err(EncodeError::new)?;
-            digests = digest(part, header, &back);
-        }
-        Ok(Packed { index, chunk, digests })
-    };
-    blocks.into_par_iter().with_min_len(32).map(one).collect()
-}
-
-/// A block as it is stored.
-fn chunk(block: UncompressedBlock, headers: &[Header]) -> Result<Chunk, EncodeError> {
-    use exr::prelude::Compression::{ZIP1, ZIP16};
-    let (layer_index, header) = (block.index.layer, &headers[block.index.layer]);
-    if cfg!(target_endian = "big") || !matches!(header.compression, ZIP1 | ZIP16) {
-        return block.compress_to_chunk(headers).map_err(EncodeError::new);
-    }
-    let y = i32::try_from(block.index.pixel_position.y()).map_err(EncodeError::new)?;
-    let lines = CompressedScanLineBlock {
-        y_coordinate: header.own_attributes.layer_position.y() + y,
-        compressed_pixels_le: zip::pack(block.data),
-    };
-    Ok(Chunk { layer_index, compressed_block: CompressedBlock::ScanLine(lines) })
-}
-
-/// The rows of a block, as they are before compression.
-fn rows(picture: &Picture, part: &Part<'_>, header: &Header, block: BlockIndex) -> Vec<u8> {
-    let width = picture.window.width();
-    let row_bytes = width * header.channels.bytes_per_pixel;
-    let mut bytes = vec![0; row_bytes * block.pixel_size.height()];
-    for (y, row) in (block.pixel_position.y()..).zip(bytes.chunks_exact_mut(row_bytes)) {
-        part.put_row(y * width..(y + 1) * width, row);
-    }
-    bytes
-}
-
-/// For each channel, the digests of its rows in a block.
-fn digest(part: &Part<'_>, header: &Header, block: &UncompressedBlock) -> Vec<Digests> {
-    let mut digests = vec![Digests::default(); part.channels.len()];
-    for line in block.lines(&header.channels) {
-        let (channel, y) = (line.location.channel, line.location.position.y());
-        digests[channel].push(y, line.value, header.channels.list[channel].sample_type);
-    }
-    digests
-}
-
-fn hash(picture: &Picture, parts: &[Part<'_>], packed: &[Packed]) -> String {
-    let mut hash = PixelHash::new(picture.display, picture.window);
-    for (layer, part) in parts.iter().enumerate() {
-        let mine: Vec<&Packed> = packed.iter().filter(|packed| packed.chunk.layer_index == layer).collect();
-        for (index, channel) in part.channels.iter().enumerate() {
-            let rows = mine.iter().map(|packed| &packed.digests[index]);
-            hash.add(channel.name.as_bytes(), channel.source.kind(), rows);
-        }
-    }
-    hash.finish()
-}
-
-fn file(headers: Vec<Header>, packed: Vec<Packed>) -> Result<Vec<u8>, EncodeError> {
-    let mut bytes = Cursor::new(Vec::new());
-    let written = exr::block::write(&mut bytes, headers.into_iter().collect(), true, |_, writer| {
-        packed.into_iter().try_for_each(|packed| writer.write_chunk(packed.index, packed.chunk))
-    });
-    written.map_err(EncodeError::new)?;
-    let mut bytes = bytes.into_inner();
-    sort::sort_attributes(&mut bytes).ok_or_else(|| EncodeError::new("the header cannot be read back"))?;
-    Ok(bytes)
+    let packer = Packer::new(picture, storage)?;
+    packer.pack(picture);
+    packer.finish(&picture.cryptomattes, description)
 }
 
 /// UTF-8 as it is: the crate's own conversion panics beyond Latin-1.

@@ -1,7 +1,9 @@
 use std::time::{Duration, SystemTime};
 
 use exr::math::Vec2;
-use exr::meta::attribute::{IntegerBounds, SampleType};
+use exr::meta::MetaData;
+use exr::meta::attribute::{AttributeValue, IntegerBounds, SampleType};
+use exr::meta::header::Header;
 use exr::prelude::LineOrder;
 use glam::DVec3;
 use half::f16;
@@ -284,6 +286,62 @@ fn equal_pictures_are_equal_bytes_in_parts_and_from_a_file_again() {
     let back = output::read_all(&room.path().join("a.exr")).unwrap();
     let again = encode(&back.picture, storage, &Description { kept: back.attributes, ..Description::default() });
     assert!(again.unwrap().bytes == first.bytes);
+}
+
+/// A tall picture of all kinds of channels, and some rows of it.
+fn tall() -> Picture {
+    let (window, area) = (Window { x0: -2, y0: 11, x1: 7, y1: 11 + 300 }, 9 * 300);
+    let mut picture = Picture::new((5, 320), window);
+    picture.pixels.iter_mut().enumerate().for_each(|(i, pixel)| *pixel = [i as f32 * 40.0, f32::NAN, 0.3, 1.0]);
+    let floats: Plane<f32> = (0..area).map(|i| 0.37 * i as f32).collect();
+    for (name, samples) in [
+        ("albedo.R", Samples::halves(&floats)),
+        ("albedo.G", Samples::halves(&floats)),
+        ("albedo.B", Samples::halves(&floats)),
+        ("crypto_object00.R", Samples::Float(floats.clone())),
+        ("depth.Z", Samples::Float(floats)),
+        ("id.object", Samples::Uint((0..area as u32).collect())),
+    ] {
+        picture.channels.push(Channel { name: name.into(), samples });
+    }
+    picture.cryptomattes = layered().cryptomattes;
+    picture
+}
+
+/// Rows that come one band after another, the last ones first, make the file of the whole picture; and so does what is told
+/// of the rows so far with those that wait.
+#[test]
+fn rows_in_bands_make_the_same_file() {
+    let picture = tall();
+    for compression in Compression::ALL {
+        for (multipart, color) in [(false, ColorSpace::AcesCg), (true, ColorSpace::Rec709)] {
+            let storage = Storage { compression, multipart, color, ..Storage::default() };
+            let whole = encode(&picture, storage, &described()).unwrap();
+            // Through a matrix one NaN becomes three.
+            let dropped = if multipart { 2700 } else { 3 * 2700 };
+            assert!(whole.losses.dropped == dropped && multipart == (whole.losses.clamped > 0), "{:?}", whole.losses);
+            let packer = Packer::new(&picture, storage).unwrap();
+            let high = 32.max(packer.rows()) as i32;
+            let bands = (0..300 / high + 1).rev().map(|band| {
+                let y0 = 11 + band * high;
+                picture.crop(Window { y0, y1: (y0 + high).min(311), ..picture.window }).unwrap()
+            });
+            let (late, early): (Vec<_>, Vec<_>) = bands.partition(|rows| rows.window.y0 < 11 + high);
+            early.iter().for_each(|rows| packer.pack(rows));
+            let so_far = packer.so_far(late.iter().cloned()).unwrap();
+            assert!(so_far.finish(&picture.cryptomattes, &described()).unwrap() == whole, "{compression:?}");
+            late.iter().for_each(|rows| packer.pack(rows));
+            assert!(packer.finish(&picture.cryptomattes, &described()).unwrap() == whole, "{compression:?}");
+        }
+    }
+}
+
+#[test]
+fn a_file_that_lacks_rows_is_refused() {
+    let picture = tall();
+    let packer = Packer::new(&picture, FLOAT).unwrap();
+    packer.pack(&picture.crop(Window { y1: 200, ..picture.window }).unwrap());
+    assert!(packer.seconds() > 0.0 && packer.finish(&picture.cryptomattes, &described()).is_err());
 }
 
 #[test]

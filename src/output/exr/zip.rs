@@ -24,21 +24,23 @@ pub(super) fn pack(bytes: Vec<u8>) -> Vec<u8> {
 struct Packer {
     zlib: Compress,
     sorted: Vec<u8>,
+    packed: Vec<u8>,
 }
 
 impl Packer {
     fn new() -> Self {
-        Packer { zlib: Compress::new(Compression::fast(), true), sorted: Vec::new() }
+        Packer { zlib: Compress::new(Compression::fast(), true), sorted: Vec::new(), packed: Vec::new() }
     }
 
     fn pack(&mut self, bytes: Vec<u8>) -> Vec<u8> {
         sort(&bytes, &mut self.sorted);
         self.zlib.reset();
-        // No more than this is of use.
-        let mut packed = Vec::with_capacity(bytes.len());
-        let ended = self.zlib.compress_vec(&self.sorted, &mut packed, FlushCompress::Finish);
+        // No more than this is of use, and what stays is as long as it need be.
+        self.packed.clear();
+        self.packed.reserve(bytes.len());
+        let ended = self.zlib.compress_vec(&self.sorted, &mut self.packed, FlushCompress::Finish);
         match ended {
-            Ok(Status::StreamEnd) if packed.len() < bytes.len() => packed,
+            Ok(Status::StreamEnd) if self.packed.len() < bytes.len() => self.packed.clone(),
             _ => bytes,
         }
     }

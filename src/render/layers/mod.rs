@@ -117,11 +117,14 @@ impl<'s> LayerPlan<'s> {
         }
     }
 
-    /// Puts the channels into a picture, all 0.
+    /// Puts the channels into a picture, as long as its colour and all 0, and Cryptomattes that show nothing yet.
     pub fn open(&self, picture: &mut Picture) {
-        let area = picture.window.area();
-        let blank = |(name, kind): (String, SampleKind)| Channel { name, samples: kind.zeros(area) };
+        let length = picture.pixels.len();
+        let blank = |(name, kind): (String, SampleKind)| Channel { name, samples: kind.zeros(length) };
         picture.channels = channels(self.layers).into_iter().map(blank).collect();
+        let mattes = Aov::CRYPTOMATTES.into_iter().filter(|aov| self.layers.has(*aov));
+        let empty = |aov: Aov| Cryptomatte { name: aov.name().to_owned(), manifest: BTreeMap::new() };
+        picture.cryptomattes = mattes.map(empty).collect();
     }
 
     /// Puts what a noise level took in the place of what is known of its first samples alone.
@@ -163,21 +166,34 @@ impl<'s> LayerPlan<'s> {
         }
     }
 
-    /// Names of the numbers in the id channels of a picture, 0 left out.
-    pub fn names(&self, picture: &Picture) -> IdNames {
-        let numbers = |name: &str| -> BTreeSet<u32> {
-            match picture.channel(name).map(|channel| &channel.samples) {
-                // Neighbours mostly see the same.
-                Some(Samples::Uint(ids)) => {
-                    ids.chunk_by(|a, b| a == b).map(|same| same[0]).filter(|id| *id > 0).collect()
-                }
-                _ => BTreeSet::new(),
-            }
+    /// Names of the numbers in the id channels.
+    pub fn names(&self, numbers: Numbers) -> IdNames {
+        let named = |numbers: BTreeSet<u32>, aov: Aov| {
+            numbers.into_iter().map(|number| (number, self.name(aov, number - 1))).collect()
         };
-        let named = |channel: &str, aov: Aov| {
-            numbers(channel).into_iter().map(|number| (number, self.name(aov, number - 1))).collect()
+        let [object, material] = numbers.0;
+        IdNames { object: named(object, Aov::CryptoObject), material: named(material, Aov::CryptoMaterial) }
+    }
+}
+
+/// Numbers in the id channels, 0 left out: of objects and of materials.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Numbers([BTreeSet<u32>; 2]);
+
+impl Numbers {
+    /// Those of a picture.
+    pub fn of(picture: &Picture) -> Self {
+        let numbers = |name: &str| match picture.channel(name).map(|channel| &channel.samples) {
+            // Neighbours mostly see the same.
+            Some(Samples::Uint(ids)) => ids.chunk_by(|a, b| a == b).map(|same| same[0]).filter(|id| *id > 0).collect(),
+            _ => BTreeSet::new(),
         };
-        IdNames { object: named("id.object", Aov::CryptoObject), material: named("id.material", Aov::CryptoMaterial) }
+        Numbers(["id.object", "id.material"].map(numbers))
+    }
+
+    /// Adds those of other rows.
+    pub fn add(&mut self, more: Numbers) {
+        self.0.iter_mut().zip(more.0).for_each(|(all, mut more)| all.append(&mut more));
     }
 }
 
