@@ -446,7 +446,7 @@ impl Batch {
 }
 
 /// The pixels of a packet as a Z curve meets them: 4 x 2.
-const PACKET: [(i32, i32); LANES] = [(0, 0), (1, 0), (0, 1), (1, 1), (2, 0), (3, 0), (2, 1), (3, 1)];
+pub const PACKET: [(i32, i32); LANES] = [(0, 0), (1, 0), (0, 1), (1, 1), (2, 0), (3, 0), (2, 1), (3, 1)];
 
 /// Where the first pixel of a packet is in a frame, if all of the packet lies in the window.
 fn whole_packet(window: Window, frame: Window, (x, y): (i32, i32)) -> Option<usize> {

@@ -164,7 +164,7 @@ impl<'s> Task<'s> {
         // What a pixel costs depends on those that are traced with it: they must not depend on a crop.
         let asked_for_cost = plan.layers.has(Aov::Cost) && !self.unasked;
         let whole = if asked_for_cost { block.whole() } else { *block };
-        let mut tape = LayerTape::new(frames, plan, whole.window.area());
+        let mut tape = LayerTape::new(frames, plan, whole.window);
         let mut work = self.trace_moments(frames, &whole, &mut tape, LayerTape::at, stop)?;
         work.layers = Some(tape.finish(whole.window));
         if whole.window != block.window {
@@ -219,7 +219,7 @@ impl<'s> Task<'s> {
         let mut work = match &self.layers {
             None => block.trace_until(noise, &view, &direct, &mut Silent, stop)?,
             Some(plan) => {
-                let mut tape = LayerTape::new(frames, plan, whole.window.area());
+                let mut tape = LayerTape::new(frames, plan, whole.window);
                 let work = block.trace_until(noise, &view, &direct, &mut tape, stop)?;
                 work.effort.iter().for_each(|effort| tape.took(&effort.samples));
                 let mut layers = tape.finish(whole.window);

@@ -9,15 +9,15 @@ use crate::scene::{Aov, Layers};
 
 /// Means of the normals and albedos of each pixel. Samples are drawn from the filter, so all weigh the same.
 ///
-/// A pixel is a row of eight numbers: x, y, z, red, green, blue, and two to spare. So a packet is turned into rows once,
-/// and each of them is added at one go.
+/// The sums of a pixel are a row of eight numbers: x, y, z, red, green, blue, and two to spare. So a packet is turned into
+/// rows once, and each of them is added at one go.
 #[derive(Debug, Default)]
 pub(in crate::render) enum Filtered {
     /// No layer needs them.
     #[default]
     Unasked,
-    /// Of a single sample: the values.
-    Single(Vec<[f32; LANES]>),
+    /// Of a single sample: x, y, z, red, green, blue of all pixels.
+    Single([Vec<f32>; 6]),
     /// Of several: their sums.
     Sums(Vec<[f64; LANES]>),
 }
@@ -27,7 +27,7 @@ impl Filtered {
     pub fn new(layers: Layers, pixels: usize, spp: Option<u32>) -> Self {
         match (layers.has_any(&[Aov::Normal, Aov::Albedo]), spp) {
             (false, _) => Filtered::Unasked,
-            (true, Some(1)) => Filtered::Single(vec![[0.0; LANES]; pixels]),
+            (true, Some(1)) => Filtered::Single([(); 6].map(|()| vec![0.0; pixels])),
             (true, _) => Filtered::Sums(vec![[0.0; LANES]; pixels]),
         }
     }
@@ -40,16 +40,17 @@ impl Filtered {
     #[inline(always)]
     pub fn add8(&mut self, normal: &Vec3x8, albedo: &Vec3x8, places: &Places) {
         let zero = Float8::ZERO;
+        if let Filtered::Single(columns) = self {
+            let values = [normal.x, normal.y, normal.z, albedo.x, albedo.y, albedo.z];
+            // A sum, so that there is no zero below zero.
+            let values = values.map(|value| (value + zero).to_array());
+            columns.iter_mut().zip(&values).for_each(|(column, values)| places.set(column, values));
+            return;
+        }
         let rows = [normal.x, normal.y, normal.z, albedo.x, albedo.y, albedo.z, zero, zero];
         let rows = Float8::transpose(rows);
         match self {
-            Filtered::Unasked => {}
-            Filtered::Single(values) => {
-                for (pixel, row) in places.pixels.iter().zip(rows) {
-                    let value = &mut values[*pixel as usize];
-                    *value = (Float8::new(*value) + row).to_array();
-                }
-            }
+            Filtered::Unasked | Filtered::Single(_) => {}
             // In an order that is always the same for these samples.
             Filtered::Sums(sums) if places.whole => {
                 let four: [Float8; 4] = std::array::from_fn(|i| rows[i] + rows[i + 4]);
@@ -67,7 +68,9 @@ impl Filtered {
         let values = normal.to_array().into_iter().chain(albedo.to_array());
         match self {
             Filtered::Unasked => {}
-            Filtered::Single(rows) => rows[pixel].iter_mut().zip(values).for_each(|(own, value)| *own += value as f32),
+            Filtered::Single(columns) => {
+                columns.iter_mut().zip(values).for_each(|(column, value)| column[pixel] += value as f32);
+            }
             Filtered::Sums(rows) => rows[pixel].iter_mut().zip(values).for_each(|(own, value)| *own += value),
         }
     }
@@ -76,7 +79,7 @@ impl Filtered {
     pub fn finish(self, samples: impl Fn(usize) -> u32) -> [[Samples; 3]; 2] {
         let columns = match self {
             Filtered::Unasked => Default::default(),
-            Filtered::Single(values) => columns(values.len(), |pixel| Float8::new(values[pixel])),
+            Filtered::Single(columns) => columns,
             Filtered::Sums(sums) => columns(sums.len(), |pixel| {
                 let share = 1.0 / f64::from(samples(pixel));
                 Float8::new(sums[pixel].map(|sum| (sum * share) as f32))

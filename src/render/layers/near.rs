@@ -1,7 +1,7 @@
 //! What a pixel keeps: the sample nearest to its centre, and batches of samples for the variance of its mean.
 
 use super::sums::Places;
-use crate::lanes::{LANES, first_least};
+use crate::lanes::{Float8, LANES, Mask8, bits, first_least, float8};
 use crate::scene::{Aov, Layers};
 use crate::shapes::RowRef;
 
@@ -109,23 +109,19 @@ impl Nearest {
     /// The same for some samples of a packet, layer by layer; lanes that do not count may hold anything. `indices` are
     /// those of objects and materials.
     #[inline(always)]
-    pub fn see8(
-        &mut self,
-        places: &Places,
-        depth: &[f32; LANES],
-        mut indices: [[u32; LANES]; 2],
-        near: impl Fn(usize) -> Near,
-    ) {
+    pub fn see8(&mut self, places: &Places, depth: Float8, indices: [[u32; LANES]; 2], near: impl Fn(usize) -> Near) {
         if !self.depth.is_empty() {
-            places.set(&mut self.depth, depth);
+            let depth = Mask8::from_bits(places.lanes).select(depth, float8(super::MISS_DEPTH));
+            places.set(&mut self.depth, &depth.to_array());
         }
         if !self.objects.is_empty() {
-            indices.as_flattened_mut().iter_mut().for_each(|index| *index = index.wrapping_add(1));
-            places.set(&mut self.objects, &indices[0]);
-            places.set(&mut self.materials, &indices[1]);
+            let number = |i: usize, index: u32| if places.lanes >> i & 1 == 1 { index.wrapping_add(1) } else { 0 };
+            let [objects, materials] = indices.map(|all| std::array::from_fn(|i| number(i, all[i])));
+            places.set(&mut self.objects, &objects);
+            places.set(&mut self.materials, &materials);
         }
         if !self.near.is_empty() {
-            places.set(&mut self.near, &std::array::from_fn(near));
+            bits(places.lanes).for_each(|i| self.near[places.pixels[i] as usize] = near(i));
         }
     }
 }

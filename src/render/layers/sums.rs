@@ -39,12 +39,20 @@ pub(in crate::render) struct Places<'a> {
     pub lanes: u32,
     /// Whether all lanes are of one pixel, whose samples are so many packets in any block.
     pub whole: bool,
+    /// Where all lanes are the only samples of 4 x 2 pixels, the place of those below the first.
+    pub below: Option<usize>,
 }
 
 impl Places<'_> {
+    /// Sets the pixels of those that count; where all lanes are 4 x 2 pixels, all of them: the others are to hold what no
+    /// sample sees.
     #[inline(always)]
     pub fn set<T: Copy>(&self, column: &mut [T], values: &[T; LANES]) {
-        if self.lanes == (1 << LANES) - 1 {
+        if let Some(below) = self.below {
+            let (first, [a, b, c, d, e, f, g, h]) = (self.pixels[0] as usize, *values);
+            column[first..first + 4].copy_from_slice(&[a, b, e, f]);
+            column[below..below + 4].copy_from_slice(&[c, d, g, h]);
+        } else if self.lanes == (1 << LANES) - 1 {
             (0..LANES).for_each(|i| column[self.pixels[i] as usize] = values[i]);
         } else {
             bits(self.lanes).for_each(|i| column[self.pixels[i] as usize] = values[i]);

@@ -9,6 +9,7 @@ use crate::integrate::{RayKind, Record, Samples8, Seen, Silent, Spent, Summed, T
 use crate::lanes::{LANES, Mask8, Ray, Vec3x8, bits};
 use crate::plan::Owner;
 use crate::reference;
+use crate::render::block::PACKET;
 use crate::render::{Frame, shutter};
 use crate::scene::Aov;
 use crate::shade::attributes;
@@ -24,6 +25,8 @@ pub(in crate::render) struct LayerTape<'a, 's> {
     sums: Sums,
     /// Whether packets of one pixel hold the same samples in any block.
     whole: bool,
+    /// Where each pixel has a single sample, the places of a packet's 4 x 2 pixels, counted from the first.
+    places: Option<[u32; LANES]>,
     tile: [Packet; PACKETS],
 }
 
@@ -36,6 +39,8 @@ struct Packet {
     nearest: u32,
     /// Whether all lanes are of one pixel.
     one: bool,
+    /// Where all lanes are the only samples of 4 x 2 pixels, the place of those below the first.
+    below: Option<usize>,
 }
 
 impl Packet {
@@ -56,12 +61,15 @@ fn forget(packets: &mut [Packet], pixel: u32) {
 }
 
 impl<'a, 's> LayerTape<'a, 's> {
-    pub fn new(frames: &'a [Frame<'s>], plan: &'a LayerPlan<'s>, pixels: usize) -> Self {
+    pub fn new(frames: &'a [Frame<'s>], plan: &'a LayerPlan<'s>, block: Window) -> Self {
         let axis = frames[0].axis.map(|axis| axis.as_vec3().to_array());
         // To a noise level a pixel takes what it needs.
         let spp = frames[0].noise.is_none().then_some(frames[0].spp);
         let whole = frames.len() == 1 && spp.is_some_and(|spp| (spp as usize).is_multiple_of(LANES));
-        LayerTape { frames, plan, axis, sums: Sums::new(plan, pixels, spp), whole, tile: Default::default() }
+        let width = block.width() as u32;
+        let places = (spp == Some(1)).then(|| PACKET.map(|(right, down)| right as u32 + down as u32 * width));
+        let sums = Sums::new(plan, block.area(), spp);
+        LayerTape { frames, plan, axis, sums, whole, places, tile: Default::default() }
     }
 
     /// What comes next is seen at this moment.
@@ -101,7 +109,7 @@ impl<'a, 's> LayerTape<'a, 's> {
     fn add_nearest(&mut self, packet: &Packet, nearest: u32, seen: &Seen) {
         let (t, dir) = (seen.rays.t_max, seen.rays.dir);
         let share = self.axis.map_or_else(|| dir.length(), |axis| dir.dot(Vec3x8::splat(axis)));
-        let (depth, t, rows) = ((t * share).to_array(), t.to_array(), seen.rows.to_array());
+        let (depth, t, rows) = (t * share, t.to_array(), seen.rows.to_array());
         let near = |i: usize| Near {
             t: t[i],
             row: RowRef::from_lane(rows[i]),
@@ -112,12 +120,12 @@ impl<'a, 's> LayerTape<'a, 's> {
         let (objects, all) = (&self.plan.objects, self.sums.nearest());
         if nearest.is_power_of_two() {
             let i = nearest.trailing_zeros() as usize;
-            all.see(packet.pixels[i] as usize, near(i), depth[i], objects.of(seen.owners[i].primitive));
+            all.see(packet.pixels[i] as usize, near(i), depth.to_array()[i], objects.of(seen.owners[i].primitive));
         } else {
-            let places = Places { pixels: &packet.pixels, lanes: nearest, whole: false };
+            let places = Places { pixels: &packet.pixels, lanes: nearest, whole: false, below: packet.below };
             let mut primitives = [0; LANES];
             (0..LANES).for_each(|i| primitives[i] = seen.owners[i].primitive);
-            all.see8(&places, &depth, [objects.of_all(primitives), *seen.materials], near);
+            all.see8(&places, depth, [objects.of_all(primitives), *seen.materials], near);
         }
     }
 }
@@ -149,7 +157,11 @@ impl Record for LayerTape<'_, '_> {
             let one = *pixels == [pixels[0]; LANES];
             let nearest = self.sums.nearest().choose((pixels, one), distances, count);
             let (before, rest) = self.tile.split_at_mut(p);
-            rest[0] = Packet { pixels: *pixels, index: samples.index, nearest, one };
+            let below = self
+                .places
+                .filter(|places| count == LANES && pixels.map(|pixel| pixel.wrapping_sub(pixels[0])) == *places);
+            let below = below.map(|places| (pixels[0] + places[2]) as usize);
+            rest[0] = Packet { pixels: *pixels, index: samples.index, nearest, one, below };
             let goes_on = before.last().is_some_and(|packet| packet.pixels[LANES - 1] == pixels[0]);
             if goes_on && nearest & rest[0].lanes_of(pixels[0]) != 0 {
                 forget(before, pixels[0]);
@@ -160,7 +172,8 @@ impl Record for LayerTape<'_, '_> {
     fn surface(&mut self, seen: &Seen) {
         let packet = &{ self.tile[seen.packet] };
         let hit = Mask8::from_bits(seen.hit);
-        let places = Places { pixels: &packet.pixels, lanes: seen.hit, whole: self.whole && packet.one };
+        let Packet { one, below, .. } = *packet;
+        let places = Places { pixels: &packet.pixels, lanes: seen.hit, whole: self.whole && one, below };
         if self.sums.filtered.is_asked() {
             let met = |value: Vec3x8| Vec3x8::select(hit, value, Vec3x8::ZERO);
             self.sums.filtered.add8(&met(seen.normal), &met(seen.bsdf.reflectance()), &places);
