@@ -29,8 +29,10 @@ const FLOORS: [&[&str]; 15] = [
 const GROUND: &str = "scene";
 
 /// Where a crate may be named.
-const CRATES: [(&str, &[&str]); 2] =
-    [("wide", &["lanes"]), ("rayon", &["render", "batch", "accel/build", "shapes/store", "measure", "cli", "output"])];
+const CRATES: [(&str, &[&str]); 2] = [
+    ("wide", &["lanes"]),
+    ("rayon", &["render", "batch", "accel/build", "shapes/store", "measure", "cli", "output", "scene/particles"]),
+];
 
 #[derive(Debug)]
 struct File {

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{Camera, Lens, Scene, Shape};
+use super::{Camera, CloudShapes, Lens, Rows, Scene, Shape};
 
 /// Room around the scene: the picture is so much larger.
 const MARGIN: f64 = 1.06;
@@ -27,33 +27,42 @@ pub fn direction(up: DVec3) -> DVec3 {
 
 /// A ball around everything but planes: centre and radius.
 pub fn ball(scene: &Scene) -> (DVec3, f64) {
-    let balls = balls(scene);
-    if balls.is_empty() { (DVec3::ZERO, 1.0) } else { around_all(&balls) }
+    around_all(scene).unwrap_or((DVec3::ZERO, 1.0))
 }
 
-fn balls(scene: &Scene) -> Vec<(DVec3, f64)> {
+/// Balls that hold a scene, one after the other: a million spheres are not copied for it.
+fn each_ball(scene: &Scene, mut each: impl FnMut(DVec3, f64)) {
     let mut balls = Vec::new();
-    scene.primitives().for_each(|primitive| bound(&primitive.shape, &mut balls));
-    balls
+    scene.objects.iter().for_each(|object| bound(&object.shape, &mut balls));
+    balls.drain(..).for_each(|(center, radius)| each(center, radius));
+    for cloud in &scene.clouds {
+        match &cloud.shapes {
+            CloudShapes::Spheres(Rows::F64(rows)) => {
+                rows.iter().for_each(|[x, y, z, radius]| each(DVec3::new(*x, *y, *z), *radius));
+            }
+            shapes => (0..shapes.len()).for_each(|row| {
+                bound(&shapes.shape(row), &mut balls);
+                balls.drain(..).for_each(|(center, radius)| each(center, radius));
+            }),
+        }
+    }
 }
 
-fn around_all(balls: &[(DVec3, f64)]) -> (DVec3, f64) {
-    let low = balls.iter().fold(DVec3::INFINITY, |low, (center, radius)| low.min(center - *radius));
-    let high = balls.iter().fold(DVec3::NEG_INFINITY, |high, (center, radius)| high.max(center + *radius));
-    let center = 0.5 * (low + high);
-    let radius = balls.iter().map(|(ball, radius)| (ball - center).length() + radius).fold(0.0, f64::max);
-    (center, radius)
+fn around_all(scene: &Scene) -> Option<(DVec3, f64)> {
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    each_ball(scene, |center, radius| (low, high) = (low.min(center - radius), high.max(center + radius)));
+    let (center, mut reach) = (0.5 * (low + high), 0f64);
+    each_ball(scene, |ball, radius| reach = reach.max((ball - center).length() + radius));
+    (low.x <= high.x).then_some((center, reach))
 }
 
 /// The view of everything but planes, as near as the lens and the shape of the picture (`aspect`: width over height)
 /// allow; `around`: from a distance that is right for all directions.
 pub fn view(scene: &Scene, camera: &Camera, aspect: f64, around: bool) -> View {
-    let balls = balls(scene);
     let direction = direction(camera.up);
-    if balls.is_empty() {
+    let Some((center, radius)) = around_all(scene) else {
         return View { eye: direction, target: DVec3::ZERO };
-    }
-    let (center, radius) = around_all(&balls);
+    };
     let vfov = match camera.lens {
         Lens::Pinhole { vfov } | Lens::ThinLens { vfov, .. } => vfov,
         Lens::Orthographic { .. } | Lens::Panoramic => {
@@ -67,7 +76,7 @@ pub fn view(scene: &Scene, camera: &Camera, aspect: f64, around: bool) -> View {
         return View { eye: center + distance * direction, target: center };
     }
     let facing = Camera { eye: center + direction, target: center, ..camera.clone() };
-    tight(&balls, center, facing.axes(), tans)
+    tight(scene, center, facing.axes(), tans)
 }
 
 /// The nearest place from which all balls are inside the four sides of the frustum.
@@ -75,17 +84,20 @@ pub fn view(scene: &Scene, camera: &Camera, aspect: f64, around: bool) -> View {
 /// A side with the half angle a holds a ball at (x, z) of radius r, z the way forward, if
 /// `cos a (x - eye_x) - sin a (z - eye_z) + r <= 0`; the greatest of the two opposite sides over all balls are two
 /// equations for the eye.
-fn tight(balls: &[(DVec3, f64)], center: DVec3, axes: (DVec3, DVec3, DVec3), tans: DVec2) -> View {
+fn tight(scene: &Scene, center: DVec3, axes: (DVec3, DVec3, DVec3), tans: DVec2) -> View {
     let (right, up, forward) = axes;
-    let mut eye = DVec3::new(0.0, 0.0, f64::INFINITY);
-    for (axis, sideways) in [right, up].into_iter().enumerate() {
-        let (sin, cos) = tans[axis].atan().sin_cos();
-        let (mut plus, mut minus) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
-        for (ball, radius) in balls {
-            let (x, z) = ((ball - center).dot(sideways), (ball - center).dot(forward));
-            plus = plus.max(cos * x - sin * z + radius);
-            minus = minus.max(-cos * x - sin * z + radius);
+    let sides = [(right, tans.x), (up, tans.y)].map(|(sideways, tan)| (sideways, tan.atan().sin_cos()));
+    let mut most = [[f64::NEG_INFINITY; 2]; 2];
+    each_ball(scene, |ball, radius| {
+        let z = (ball - center).dot(forward);
+        for ((sideways, (sin, cos)), [plus, minus]) in sides.iter().zip(&mut most) {
+            let x = (ball - center).dot(*sideways);
+            *plus = plus.max(cos * x - sin * z + radius);
+            *minus = minus.max(-cos * x - sin * z + radius);
         }
+    });
+    let mut eye = DVec3::new(0.0, 0.0, f64::INFINITY);
+    for (axis, ((_, (sin, cos)), [plus, minus])) in sides.into_iter().zip(most).enumerate() {
         eye[axis] = (plus - minus) / (2.0 * cos);
         eye.z = eye.z.min(-(plus + minus) / (2.0 * sin));
     }
@@ -123,7 +135,7 @@ pub fn bound(shape: &Shape, balls: &mut Vec<(DVec3, f64)>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Cloud, CloudMaterial, CloudShapes, Rows};
+    use crate::scene::{Cloud, CloudMaterial};
 
     /// Every ball is inside the picture, and on each pair of opposite sides or the other one some ball touches.
     #[test]

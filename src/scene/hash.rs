@@ -95,17 +95,17 @@ impl Sum {
     fn picture(&mut self, image: &ImageTexture) {
         let ImageTexture { file: _, wrap, filter, color_space, width, height, texels } = image;
         self.small(&(wrap, filter, color_space, width, height));
-        self.numbers(texels.as_flattened().iter().map(|value| value.to_le_bytes()));
+        self.numbers(texels.as_flattened());
     }
 
     fn cloud(&mut self, Cloud { shapes, material, colors, name, group }: &Cloud) {
         self.small(&(name, group, shapes.len(), colors.is_some()));
         match material {
             CloudMaterial::One(material) => self.small(material),
-            CloudMaterial::Each(materials) => self.numbers(materials.iter().map(|index| index.to_le_bytes())),
+            CloudMaterial::Each(materials) => self.numbers(materials),
         }
         if let Some(colors) = colors {
-            self.numbers(colors.as_flattened().iter().map(|value| value.to_le_bytes()));
+            self.numbers(colors.as_flattened());
         }
         match shapes {
             CloudShapes::Spheres(rows) => self.rows("spheres", rows),
@@ -120,7 +120,7 @@ impl Sum {
             }
             CloudShapes::Polygons { corners, starts } => {
                 self.rows("polygons", corners);
-                self.numbers(starts.iter().map(|start| start.to_le_bytes()));
+                self.numbers(starts);
             }
         }
     }
@@ -128,8 +128,8 @@ impl Sum {
     fn rows<const N: usize>(&mut self, kind: &str, rows: &Rows<N>) {
         self.small(&kind);
         match rows {
-            Rows::F32(rows) => self.numbers(rows.as_flattened().iter().map(|value| value.to_le_bytes())),
-            Rows::F64(rows) => self.numbers(rows.as_flattened().iter().map(|value| value.to_le_bytes())),
+            Rows::F32(rows) => self.numbers(rows.as_flattened()),
+            Rows::F64(rows) => self.numbers(rows.as_flattened()),
         }
     }
 
@@ -139,16 +139,25 @@ impl Sum {
         let _ = writeln!(self, "{value:?}");
     }
 
-    fn numbers<const BYTES: usize>(&mut self, numbers: impl Iterator<Item = [u8; BYTES]>) {
-        numbers.for_each(|number| self.bytes(&number));
+    /// Numbers by their bytes, the lowest first.
+    fn numbers<T: bytemuck::NoUninit>(&mut self, numbers: &[T]) {
+        let bytes: &[u8] = bytemuck::cast_slice(numbers);
+        if cfg!(target_endian = "little") {
+            self.bytes(bytes);
+        } else {
+            bytes.chunks(size_of::<T>()).for_each(|number| number.iter().rev().for_each(|byte| self.bytes(&[*byte])));
+        }
     }
 
     #[inline]
     fn bytes(&mut self, bytes: &[u8]) {
-        self.1.extend_from_slice(bytes);
-        if self.1.len() >= PART {
+        if self.1.len() + bytes.len() >= PART {
             self.0.update(&self.1);
             self.1.clear();
+        }
+        match bytes.len() < PART {
+            true => self.1.extend_from_slice(bytes),
+            false => self.0.update(bytes),
         }
     }
 

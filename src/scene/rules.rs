@@ -10,7 +10,7 @@ use std::borrow::Cow;
 
 use glam::DVec3;
 
-use super::{Camera, Lens, Shape};
+use super::{Camera, Lens, Rows, Shape};
 
 /// Largest size of a coordinate or length: its square still fits an f32.
 pub const LARGEST: f64 = 1e15;
@@ -101,6 +101,17 @@ pub fn direction_broken_by(v: DVec3) -> Option<&'static str> {
         size if size < SHORTEST => Some("must be longer than 1e-100"),
         size if size > LARGEST => Some("must be at most 1e15"),
         _ => None,
+    }
+}
+
+/// Whether all rows are spheres that break no rule; what [`shape`] would say of one that does is not looked for.
+pub fn are_spheres(rows: &Rows<4>) -> bool {
+    // Written so that NaN is neither.
+    let is_place = |x: f64| x.abs() <= LARGEST;
+    let is_sphere = |[x, y, z, r]: [f64; 4]| is_place(x) & is_place(y) & is_place(z) & is_place(r) & (r > 0.0);
+    match rows {
+        Rows::F32(rows) => rows.iter().all(|row| is_sphere(row.map(f64::from))),
+        Rows::F64(rows) => rows.iter().all(|row| is_sphere(*row)),
     }
 }
 

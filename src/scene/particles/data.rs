@@ -9,7 +9,7 @@ use glam::{DMat3, DVec3};
 use super::element::Element;
 use super::fields::{Field, Fields, Rows};
 use super::frame::{Cell, Columns, Frame, wrong};
-use super::lines::{Lines, Reading, Words, count, number};
+use super::lines::{Line, Lines, Reading, Words, count, number};
 use crate::scene::error::{Warning, shorten};
 
 /// What the header says.
@@ -155,14 +155,16 @@ fn pass(lines: &mut Lines) -> Reading<()> {
 /// Goes to the next row of a section of `count` rows.
 fn row(lines: &mut Lines, what: &str, index: u64, count: u64) -> Reading<()> {
     loop {
-        let words = format!("{what} {} of {count}", index + 1);
-        if !lines.advance_to_text()? {
-            return Err(lines.error(0, format!("there must be {words}"), "the end of the file"));
-        }
-        if lines.line().trim_ascii_start()[0] != b'#' {
+        lines.need(format_args!("{what} {} of {count}", index + 1))?;
+        if is_row(lines.line()) {
             return Ok(());
         }
     }
+}
+
+/// Whether a line is neither blank nor a comment alone.
+fn is_row(line: &[u8]) -> bool {
+    !matches!(line.trim_ascii_start(), [] | [b'#', ..])
 }
 
 /// By mass; the comment counts where the mass is of no element (one site for many atoms).
@@ -218,16 +220,29 @@ fn atoms(lines: &mut Lines, header: &Header, comment: &str, columns: &Columns) -
     let mut frame = Frame { cell: header.cell(), ..Frame::with_room(header.atoms) };
     frame.warnings.extend(guessed);
     let mut rows = Rows::new(&fields);
-    for index in 0..header.atoms {
-        if index > 0 {
-            row(lines, "atom", index, header.atoms)?;
+    let read = |rows: &mut Rows<'_>, line: Line<'_>, frame: &mut Frame| {
+        let read = rows.read(line, frame);
+        let images = read.as_ref().map(|end| Words::of(&line.bytes[*end..]).count());
+        if matches!(images, Ok(0 | 3)) && !line.bytes.contains(&b'#') {
+            return Ok(());
         }
-        let found = Words::of(lines.line()).take_while(|(_, word)| word[0] != b'#').count();
+        let found = Words::of(line.bytes).take_while(|(_, word)| word[0] != b'#').count();
         if found != width && found != width + 3 {
             let rule = format!("an atom of style {name} must have {width} columns, and three image counts or none");
-            return Err(lines.error(0, rule, found.to_string()));
+            return Err(line.error(0, rule, found.to_string()));
         }
-        rows.read(lines, &mut frame)?;
+        read.map(|_| ())
+    };
+    let one = |rows: &mut Rows<'_>, _, line: Line<'_>, frame: &mut Frame| match is_row(line.bytes) {
+        true => read(rows, line, frame),
+        false => Ok(()),
+    };
+    read(&mut rows, lines.current(), &mut frame)?;
+    let left = |frame: &Frame| header.atoms - frame.len() as u64;
+    while left(&frame) > 0 && rows.read_parts(lines, left(&frame), &mut frame, one)? > 0 {}
+    while left(&frame) > 0 {
+        row(lines, "atom", frame.len() as u64, header.atoms)?;
+        read(&mut rows, lines.current(), &mut frame)?;
     }
     rows.finish(lines, &mut frame);
     Ok(frame)

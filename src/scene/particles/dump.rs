@@ -7,7 +7,7 @@ use glam::{DMat3, DVec3};
 
 use super::fields::{Field, Fields, Rows};
 use super::frame::{Cell, Columns, Frame, numbers, wrong};
-use super::lines::{Lines, Reading, Words, count};
+use super::lines::{Line, Lines, Part, Reading, Words, count};
 use crate::scene::error::{SceneError, Warning, shorten};
 
 /// A dump that is being read.
@@ -37,9 +37,14 @@ impl Dump {
         }
         let mut frame = Frame { cell: header.cell, ..Frame::with_room(header.atoms) };
         let mut rows = Rows::new(&fields);
-        for index in 0..header.atoms {
-            atom(lines, index, header.atoms)?;
-            rows.read(lines, &mut frame)?;
+        let atoms = header.atoms;
+        let row = |rows: &mut Rows<'_>, index, line: Line<'_>, frame: &mut Frame| {
+            atom(line, index, atoms)?;
+            rows.read(line, frame).map(|_| ())
+        };
+        for index in rows.read_parts(lines, atoms, &mut frame, row)?..atoms {
+            next_atom(lines, index, atoms)?;
+            rows.read(lines.current(), &mut frame)?;
         }
         rows.finish(lines, &mut frame);
         frame.warnings.extend(self.look_ahead(lines)?);
@@ -49,8 +54,10 @@ impl Dump {
     /// Passes over the next frame; `false` at the end of the file.
     pub fn skip(&mut self, lines: &mut Lines) -> Reading<bool> {
         let Some(header) = self.header(lines)? else { return Ok(false) };
-        for index in 0..header.atoms {
-            atom(lines, index, header.atoms)?;
+        let atoms = header.atoms;
+        let all = |part: Part<'_>| part.lines().try_for_each(|(index, line)| atom(line, index, atoms));
+        for index in lines.parts(atoms, None, all, |found| found)?..atoms {
+            next_atom(lines, index, atoms)?;
         }
         self.look_ahead(lines)?;
         Ok(true)
@@ -69,7 +76,7 @@ impl Dump {
         if lines.advance_to_text()? {
             if !lines.line().starts_with(b"ITEM:") {
                 let rule = "the next frame must follow, which starts with \"ITEM: TIMESTEP\", or the end of the file";
-                return Err(lines.error(0, rule, quote(lines)));
+                return Err(lines.error(0, rule, quote(lines.line())));
             }
             lines.hold();
         }
@@ -83,17 +90,22 @@ impl Dump {
     }
 }
 
-fn quote(lines: &Lines) -> String {
-    format!("{:?}", shorten(&lines.text()))
+fn quote(line: &[u8]) -> String {
+    format!("{:?}", shorten(&String::from_utf8_lossy(line)))
 }
 
-fn atom(lines: &mut Lines, index: u64, atoms: u64) -> Reading<()> {
-    let what = || format!("atom {} of {atoms}", index + 1);
-    lines.need(&what())?;
-    if lines.line().starts_with(b"ITEM:") {
-        return Err(lines.error(0, format!("there must be {}", what()), quote(lines)));
+/// Goes to the line of an atom.
+fn next_atom(lines: &mut Lines, index: u64, atoms: u64) -> Reading<()> {
+    lines.need(format_args!("atom {} of {atoms}", index + 1))?;
+    atom(lines.current(), index, atoms)
+}
+
+/// Whether a line may be that of an atom.
+fn atom(line: Line<'_>, index: u64, atoms: u64) -> Reading<()> {
+    match line.bytes.starts_with(b"ITEM:") {
+        true => Err(line.error(0, format!("there must be atom {} of {atoms}", index + 1), quote(line.bytes))),
+        false => Ok(()),
     }
-    Ok(())
 }
 
 /// Reads up to the atoms of a frame; `None` at the end of the file.
@@ -122,7 +134,8 @@ fn header(lines: &mut Lines) -> Reading<Option<Header>> {
                 cell = Some(box_bounds(lines, bounds)?);
             }
             Some(names) if begun && (names == "ATOMS" || names.starts_with("ATOMS ")) => {
-                let missing = |what: &str| lines.error(0, format!("{what} must come before the atoms"), quote(lines));
+                let missing =
+                    |what: &str| lines.error(0, format!("{what} must come before the atoms"), quote(lines.line()));
                 let atoms = atoms.ok_or_else(|| missing("\"ITEM: NUMBER OF ATOMS\""))?;
                 let cell = cell.ok_or_else(|| missing("\"ITEM: BOX BOUNDS\""))?;
                 let names = names.split_whitespace().skip(1).map(str::to_owned).collect();
@@ -140,7 +153,7 @@ fn unexpected(lines: &Lines, begun: bool, atoms: bool, cell: bool) -> Box<SceneE
         (true, true, false) => "this must be \"ITEM: BOX BOUNDS\"",
         (true, true, true) => "this must be \"ITEM: ATOMS\" with the names of the columns",
     };
-    lines.error(0, rule, quote(lines))
+    lines.error(0, rule, quote(lines.line()))
 }
 
 fn whole(lines: &Lines, what: &str) -> Reading<u64> {
@@ -179,7 +192,11 @@ fn box_bounds(lines: &mut Lines, header: &str) -> Reading<Option<Cell>> {
     let high = DVec3::new(rows[0][1] - 0f64.max(xy).max(xz).max(xy + xz), rows[1][1] - 0f64.max(yz), rows[2][1]);
     let size = high - low;
     if size.min_element() < 0.0 {
-        return Err(lines.error(0, "the upper bounds of a box must not be less than the lower ones", quote(lines)));
+        return Err(lines.error(
+            0,
+            "the upper bounds of a box must not be less than the lower ones",
+            quote(lines.line()),
+        ));
     }
     let edges = DMat3::from_cols(DVec3::X * size.x, DVec3::new(xy, size.y, 0.0), DVec3::new(xz, yz, size.z));
     Ok(Cell::new(low, edges, periodic))

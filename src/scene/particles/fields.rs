@@ -1,9 +1,11 @@
 //! Rows of words, one an atom: what the columns of XYZ files and of LAMMPS dumps mean.
 
 use super::element::Element;
-use super::frame::{Columns, Frame, Kinds};
-use super::lines::{Lines, Reading, Slip, Words, count, number};
+use super::frame::{Columns, Frame, Kinds, TOO_MANY_KINDS};
+use super::lines::{Line, Lines, Part, Reading, Slip, Words, count, number};
+use crate::scene::error::{Place, SceneError};
 use glam::DVec3;
+use std::path::Path;
 
 /// What one column holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,6 +44,8 @@ pub struct Fields {
     open: bool,
     /// Whether the coordinates are shares of the cell.
     scaled: bool,
+    /// Whether there are colours.
+    colored: bool,
     /// The columns that somebody asked for, whatever else they hold.
     radius: Option<usize>,
     value: Option<usize>,
@@ -59,6 +63,15 @@ pub struct Rows<'a> {
     fields: &'a Fields,
     kinds: Kinds,
     odd: Odd,
+}
+
+/// Rows that were read by one thread, up to the first one that is wrong.
+struct Piece<'a> {
+    rows: Rows<'a>,
+    frame: Frame,
+    /// Number of the first line.
+    line: usize,
+    wrong: Option<Box<SceneError>>,
 }
 
 impl Fields {
@@ -86,8 +99,9 @@ impl Fields {
             }
         };
         let (radius, value) = (find(&columns.radius)?, find(&columns.value)?);
-        let list = list.into_iter().map(|(_, field)| field).collect();
-        Ok(Fields { list, open, scaled, radius, value })
+        let list: Vec<Field> = list.into_iter().map(|(_, field)| field).collect();
+        let colored = list.contains(&Field::Color(0));
+        Ok(Fields { list, open, scaled, colored, radius, value })
     }
 
     /// Whether some column holds this.
@@ -102,16 +116,56 @@ impl<'a> Rows<'a> {
         Rows { fields, kinds: Kinds::default(), odd: Odd::default() }
     }
 
-    /// Reads the current line as an atom.
+    /// Reads a line as an atom. Returns the byte at which what was read of it ends.
     ///
     /// # Errors
     /// What is wrong with the line.
-    pub fn read(&mut self, lines: &Lines, frame: &mut Frame) -> Reading<()> {
-        self.row(lines.line(), lines.number(), frame).map_err(|slip| lines.slip(slip))
+    pub fn read(&mut self, line: Line<'_>, frame: &mut Frame) -> Reading<usize> {
+        self.row(line.bytes, line.number, frame).map_err(|slip| line.slip(slip))
+    }
+
+    /// Reads the next lines by `read`, `most` of them, as far as [`Lines::parts`] goes. Returns how many they were.
+    ///
+    /// # Errors
+    /// The first one of `read`, which is given how many lines came before.
+    pub fn read_parts(
+        &mut self,
+        lines: &mut Lines,
+        most: u64,
+        frame: &mut Frame,
+        read: impl Fn(&mut Rows<'a>, u64, Line<'_>, &mut Frame) -> Reading<()> + Sync,
+    ) -> Reading<u64> {
+        let (fields, cell, path) = (self.fields, frame.cell, lines.path().to_owned());
+        let parse = |part: Part<'_>| {
+            let frame = Frame { cell, ..Frame::with_room(part.count as u64) };
+            let mut piece = Piece { rows: Rows::new(fields), frame, line: 0, wrong: None };
+            for (before, line) in part.lines() {
+                piece.line = if piece.line == 0 { line.number } else { piece.line };
+                if let Err(error) = read(&mut piece.rows, before, line, &mut piece.frame) {
+                    piece.wrong = Some(error);
+                    break;
+                }
+            }
+            piece
+        };
+        lines.parts(most, None, parse, |piece| self.add(piece, frame, &path))
+    }
+
+    fn add(&mut self, piece: Piece<'_>, frame: &mut Frame, path: &Path) -> Reading<()> {
+        let Piece { rows, frame: part, line, wrong } = piece;
+        let kinds = self.kinds.merge(&rows.kinds).map_err(|kind| {
+            let row = part.kind.iter().position(|known| *known == kind).unwrap_or(0);
+            let place = Place { path: path.to_owned(), line: line + row, column: 1 };
+            Box::new(SceneError { place, rule: TOO_MANY_KINDS.into(), found: String::new(), help: None, span: None })
+        })?;
+        frame.append(part, &kinds);
+        self.odd.rows += rows.odd.rows;
+        self.odd.first = self.odd.first.take().or(rows.odd.first);
+        wrong.map_or(Ok(()), Err)
     }
 
     #[inline]
-    fn row(&mut self, line: &[u8], line_number: usize, frame: &mut Frame) -> Result<(), Slip> {
+    fn row(&mut self, line: &[u8], line_number: usize, frame: &mut Frame) -> Result<usize, Slip> {
         let mut words = Words::of(line);
         let (mut atom, mut color, mut kind) = ([0.0; 4], [0.0; 3], None);
         for (index, field) in self.fields.list.iter().enumerate() {
@@ -145,24 +199,28 @@ impl<'a> Rows<'a> {
                 Field::Color(part) => color[part] = real("a colour must be three numbers from 0 to 1")?,
             }
         }
-        if let Some((at, word)) = words.next().filter(|_| !self.fields.open) {
+        if !self.fields.open
+            && let Some((at, word)) = words.next()
+        {
             return Err(Slip::new(at, format!("an atom must have {} columns", self.fields.list.len()), word));
         }
         if kind.is_none() {
             kind = self.kinds.find(b"", |_| None);
         }
-        frame.kind.push(kind.ok_or_else(|| Slip::new(0, "a frame must have less than 65536 kinds of atoms", line))?);
-        if let Some(cell) = frame.cell.filter(|_| self.fields.scaled) {
+        frame.kind.push(kind.ok_or_else(|| Slip::new(0, TOO_MANY_KINDS, line))?);
+        if self.fields.scaled
+            && let Some(cell) = &frame.cell
+        {
             let place = cell.origin + cell.edges * DVec3::new(atom[0], atom[1], atom[2]);
             atom[..3].copy_from_slice(&place.to_array());
         }
-        if self.fields.has(Field::Color(0)) {
+        if self.fields.colored {
             frame.colors.push(
                 color.map(|share: f64| crate::scene::picture_file::linear_from_srgb(share.clamp(0.0, 1.0)) as f32),
             );
         }
         frame.atoms.push(atom);
-        Ok(())
+        Ok(words.at())
     }
 
     /// Ends a frame: its kinds, what was odd about it, its atoms in the order of their identifiers.

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 
 use super::element::Element;
 use super::lines::{Lines, Reading, Words, number};
@@ -10,6 +11,8 @@ use crate::scene::error::{SceneError, Warning};
 
 /// Most kinds of atoms in a frame.
 const MOST_KINDS: usize = u16::MAX as usize;
+/// What is wrong with a frame of more.
+pub const TOO_MANY_KINDS: &str = "a frame must have less than 65536 kinds of atoms";
 /// Atoms that room is made for before any is read: what a file promises may be nonsense.
 const TRUSTED: u64 = 1 << 22;
 
@@ -111,6 +114,16 @@ impl Frame {
         self.atoms.is_empty()
     }
 
+    /// Appends the atoms of another part of it, whose kinds have these indices here.
+    pub fn append(&mut self, mut part: Frame, kinds: &[u16]) {
+        self.atoms.append(&mut part.atoms);
+        self.kind.extend(part.kind.iter().map(|kind| kinds[usize::from(*kind)]));
+        self.values.append(&mut part.values);
+        self.colors.append(&mut part.colors);
+        self.ids.append(&mut part.ids);
+        self.warnings.append(&mut part.warnings);
+    }
+
     /// The index of the atom of an identifier, in a frame whose identifiers ascend.
     pub fn find(&self, id: u64) -> Option<u32> {
         self.ids.binary_search(&id).ok().map(|index| index as u32)
@@ -122,8 +135,7 @@ impl Frame {
         if self.ids.is_sorted_by(|a, b| a < b) {
             return;
         }
-        let mut order: Vec<u32> = (0..self.ids.len() as u32).collect();
-        order.sort_by_key(|index| self.ids[*index as usize]);
+        let order = ascending(&self.ids);
         let twice = order.windows(2).find(|pair| self.ids[pair[0] as usize] == self.ids[pair[1] as usize]);
         if let Some(second) = twice.map(|pair| pair[1] as usize) {
             let mut warning = lines.warning(format!("id {} is given twice", self.ids[second]));
@@ -139,34 +151,77 @@ impl Frame {
     }
 }
 
+/// The indices of identifiers in ascending order; of equal ones in the order that they have.
+fn ascending(ids: &[u64]) -> Vec<u32> {
+    let by_sorting = || {
+        let mut order: Vec<u32> = (0..ids.len() as u32).collect();
+        order.par_sort_by_key(|index| ids[*index as usize]);
+        order
+    };
+    by_counting(ids).unwrap_or_else(by_sorting)
+}
+
+/// [`ascending`] where that is a matter of putting each in its place: they differ, and few are missing between them.
+fn by_counting(ids: &[u64]) -> Option<Vec<u32>> {
+    let (least, most) = (*ids.iter().min()?, *ids.iter().max()?);
+    let places = usize::try_from(most - least).ok().filter(|places| *places < 2 * ids.len())? + 1;
+    let mut order = vec![u32::MAX; places];
+    for (index, id) in ids.iter().enumerate() {
+        let place = &mut order[(id - least) as usize];
+        if *place != u32::MAX {
+            return None;
+        }
+        *place = index as u32;
+    }
+    order.retain(|index| *index != u32::MAX);
+    Some(order)
+}
+
 /// The entries of a column in another order; a column that is not there stays empty.
-fn in_order<T: Copy>(column: &[T], order: &[u32]) -> Vec<T> {
-    if column.is_empty() { Vec::new() } else { order.iter().map(|index| column[*index as usize]).collect() }
+fn in_order<T: Copy + Send + Sync>(column: &[T], order: &[u32]) -> Vec<T> {
+    if column.is_empty() { Vec::new() } else { order.par_iter().map(|index| column[*index as usize]).collect() }
 }
 
 /// Finds kinds by their labels.
 #[derive(Debug, Default)]
 pub struct Kinds {
     list: Vec<Kind>,
+    /// Labels in order of appearance, and which kind each is.
+    labels: Vec<(Vec<u8>, u16)>,
     by_label: HashMap<Vec<u8>, u16>,
-    last: Option<(Vec<u8>, u16)>,
 }
+
+/// Labels that are compared before they are looked up.
+const FIRST_LABELS: usize = 4;
 
 impl Kinds {
     /// The index of a label; a new one becomes a kind, of the element that `element` says. All labels of an
     /// element are one kind. `None`: there are too many kinds.
     pub fn find(&mut self, label: &[u8], element: impl FnOnce(&str) -> Option<Element>) -> Option<u16> {
-        if let Some((last, kind)) = &self.last
-            && last == label
-        {
+        let mut first = self.labels.iter().take(FIRST_LABELS);
+        if let Some((_, kind)) = first.find(|(known, _)| known == label) {
             return Some(*kind);
         }
-        let kind = match self.by_label.get(label) {
-            Some(kind) => *kind,
-            None => self.add(label, element)?,
-        };
-        self.last = Some((label.to_vec(), kind));
-        Some(kind)
+        match self.by_label.get(label) {
+            Some(kind) => Some(*kind),
+            None => self.add(label, element),
+        }
+    }
+
+    /// Takes in those of another part of the frame: the index here of each of them.
+    ///
+    /// # Errors
+    /// The first one for which there are too many.
+    pub fn merge(&mut self, part: &Kinds) -> Result<Vec<u16>, u16> {
+        // Kinds have labels from the first one on, so that each is found here before a later one.
+        let mut here: Vec<u16> = Vec::with_capacity(part.list.len());
+        for (label, kind) in &part.labels {
+            let index = usize::from(*kind);
+            if index == here.len() {
+                here.push(self.find(label, |_| part.list[index].element).ok_or(*kind)?);
+            }
+        }
+        Ok(here)
     }
 
     fn add(&mut self, label: &[u8], element: impl FnOnce(&str) -> Option<Element>) -> Option<u16> {
@@ -182,10 +237,11 @@ impl Kinds {
             self.list.push(Kind { label, element });
         }
         self.by_label.insert(label.to_vec(), index as u16);
+        self.labels.push((label.to_vec(), index as u16));
         Some(index as u16)
     }
 
-    /// All of them, with a warning where the file calls an atom what is no element.
+    /// All of them.
     pub fn into_list(self) -> Vec<Kind> {
         self.list
     }
@@ -231,6 +287,21 @@ mod tests {
     }
 
     #[test]
+    fn identifiers_are_put_in_order_by_counting_and_by_sorting() {
+        for (ids, counted) in [
+            (&[5, 3, 4, 7][..], true),
+            (&[u64::MAX, 0, 7], false),
+            (&[2, 1, 2, 1], false),
+            (&[u64::MAX, u64::MAX - 1], true),
+        ] {
+            let mut want: Vec<u32> = (0..ids.len() as u32).collect();
+            want.sort_by_key(|index| ids[*index as usize]);
+            assert_eq!(ascending(ids), want, "{ids:?}");
+            assert_eq!(by_counting(ids), counted.then_some(want), "{ids:?}");
+        }
+    }
+
+    #[test]
     fn labels_of_an_element_are_one_kind() {
         let mut kinds = Kinds::default();
         let find: Vec<_> =
@@ -238,5 +309,15 @@ mod tests {
         assert_eq!(find, [0, 1, 0, 2, 0]);
         let labels: Vec<_> = kinds.into_list().into_iter().map(|kind| kind.label).collect();
         assert_eq!(labels, ["C", "O", "X"]);
+    }
+
+    #[test]
+    fn kinds_of_parts_are_those_of_the_whole() {
+        let find = |kinds: &mut Kinds, label: &str| kinds.find(label.as_bytes(), Element::of_label).unwrap();
+        let (mut all, mut part) = (Kinds::default(), Kinds::default());
+        ["C1", "X"].iter().for_each(|label| _ = find(&mut all, label));
+        ["O", "C2", "X", "Y"].iter().for_each(|label| _ = find(&mut part, label));
+        assert_eq!(all.merge(&part), Ok(vec![2, 0, 1, 3]));
+        assert_eq!(find(&mut all, "Y"), 3);
     }
 }

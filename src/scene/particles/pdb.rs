@@ -5,11 +5,12 @@
 //! their coordinates. Serials are five characters, whatever they are, so that files with letters in them read too.
 
 use std::collections::HashMap;
+use std::path::Path;
 
 use super::element::Element;
-use super::frame::{Cell, Columns, Frame, Kinds};
-use super::lines::{Lines, Reading, Slip, number};
-use crate::scene::error::Warning;
+use super::frame::{Cell, Columns, Frame, Kinds, TOO_MANY_KINDS};
+use super::lines::{Line, Lines, Part, Reading, Slip, number};
+use crate::scene::error::{Place, SceneError, Warning};
 
 /// A file that is being read.
 #[derive(Default)]
@@ -32,26 +33,24 @@ const COMMON: &[&str] = &[
 impl Pdb {
     /// Reads the next frame; `None` at the end of the file.
     pub fn read(&mut self, lines: &mut Lines, columns: &Columns, bonds: bool) -> Reading<Option<Frame>> {
-        let value = value(lines, columns)?;
-        let (mut frame, mut kinds, mut serials) = (Frame::default(), Kinds::default(), Vec::new());
-        while lines.advance()? {
+        let wanted = Wanted { value: value(lines, columns)?, serials: bonds };
+        let (mut model, mut many) = (Model::default(), true);
+        loop {
+            if std::mem::take(&mut many) {
+                let parse = |part: Part<'_>| Model::of(part, wanted);
+                lines.parts(u64::MAX, Some(b"END"), parse, |part| model.append(part))?;
+            }
+            if !lines.advance()? {
+                break;
+            }
             match record(lines.line()) {
-                b"ATOM" | b"HETATM" => {
-                    let (atom, kind) = atom(lines.line(), &mut kinds).map_err(|slip| lines.slip(slip))?;
-                    frame.atoms.push(atom);
-                    frame.kind.push(kind);
-                    if let Some((from, what)) = value {
-                        frame.values.push(real(lines.line(), from, 6, what).map_err(|slip| lines.slip(slip))? as f32);
-                    }
-                    if bonds {
-                        serials.push(serial(lines.line(), 6));
-                    }
-                }
-                b"CRYST1" => self.cell = cell(lines, &mut frame.warnings),
-                b"ENDMDL" | b"END" if !frame.atoms.is_empty() => break,
-                _ => {}
+                b"ENDMDL" | b"END" if !model.frame.atoms.is_empty() => break,
+                b"ENDMDL" | b"END" => many = true,
+                _ => model.read(lines.current(), wanted)?,
             }
         }
+        let Model { mut frame, kinds, serials, cell, .. } = model;
+        self.cell = cell.unwrap_or(self.cell);
         if frame.atoms.is_empty() {
             return Ok(None);
         }
@@ -69,7 +68,7 @@ impl Pdb {
         while lines.advance()? {
             match record(lines.line()) {
                 b"ATOM" | b"HETATM" => atoms = true,
-                b"CRYST1" => self.cell = cell(lines, &mut Vec::new()),
+                b"CRYST1" => self.cell = cell(lines.current(), &mut Vec::new()),
                 b"ENDMDL" | b"END" if atoms => break,
                 _ => {}
             }
@@ -98,6 +97,71 @@ impl Pdb {
             frame.warnings.push(warning);
         }
         Ok(())
+    }
+}
+
+/// What is read of an atom beside its place and kind.
+#[derive(Clone, Copy)]
+struct Wanted {
+    value: Option<(usize, &'static str)>,
+    serials: bool,
+}
+
+/// A frame that is being read, or a part of one.
+#[derive(Default)]
+struct Model {
+    frame: Frame,
+    kinds: Kinds,
+    serials: Vec<Serial>,
+    /// What its last `CRYST1` says, where it has one.
+    cell: Option<Option<Cell>>,
+    wrong: Option<Box<SceneError>>,
+    /// Where a part starts.
+    start: Option<Place>,
+}
+
+impl Model {
+    /// The lines of a part, up to the first one that is wrong.
+    fn of(part: Part<'_>, wanted: Wanted) -> Model {
+        let start = part.lines().next().map(|(_, line)| line.place(0));
+        let mut model = Model { start, ..Model::default() };
+        model.wrong = part.lines().try_for_each(|(_, line)| model.read(line, wanted)).err();
+        model
+    }
+
+    fn read(&mut self, line: Line<'_>, wanted: Wanted) -> Reading<()> {
+        match record(line.bytes) {
+            b"ATOM" | b"HETATM" => self.add(line.bytes, wanted).map_err(|slip| line.slip(slip))?,
+            b"CRYST1" => self.cell = Some(cell(line, &mut self.frame.warnings)),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn add(&mut self, line: &[u8], wanted: Wanted) -> Result<(), Slip> {
+        let (atom, kind) = atom(line, &mut self.kinds)?;
+        self.frame.atoms.push(atom);
+        self.frame.kind.push(kind);
+        if let Some((from, what)) = wanted.value {
+            self.frame.values.push(real(line, from, 6, what)? as f32);
+        }
+        if wanted.serials {
+            self.serials.push(serial(line, 6));
+        }
+        Ok(())
+    }
+
+    /// Adds the part that follows.
+    fn append(&mut self, mut part: Model) -> Reading<()> {
+        let too_many = |_| {
+            let place = part.start.clone().unwrap_or_else(|| Place::file(Path::new("")));
+            Box::new(SceneError { place, rule: TOO_MANY_KINDS.into(), found: String::new(), help: None, span: None })
+        };
+        let kinds = self.kinds.merge(&part.kinds).map_err(too_many)?;
+        self.frame.append(part.frame, &kinds);
+        self.serials.append(&mut part.serials);
+        self.cell = part.cell.or(self.cell);
+        part.wrong.map_or(Ok(()), Err)
     }
 }
 
@@ -143,8 +207,7 @@ fn atom(line: &[u8], kinds: &mut Kinds) -> Result<([f64; 4], u16), Slip> {
             }
         }
     };
-    kind.map(|kind| (atom, kind))
-        .ok_or_else(|| Slip::new(12, "a frame must have less than 65536 kinds of atoms", symbol))
+    kind.map(|kind| (atom, kind)).ok_or_else(|| Slip::new(12, TOO_MANY_KINDS, symbol))
 }
 
 /// The element of an atom by its name: the symbol ends in the second of the four columns. Names that start
@@ -182,13 +245,12 @@ fn value(lines: &Lines, columns: &Columns) -> Reading<Option<(usize, &'static st
 }
 
 /// The cell of a `CRYST1` record; a unit cube stands for none.
-fn cell(lines: &Lines, warnings: &mut Vec<Warning>) -> Option<Cell> {
-    let line = lines.line();
-    let read = |from, length| real(line, from, length, "a length or angle").ok();
+fn cell(line: Line<'_>, warnings: &mut Vec<Warning>) -> Option<Cell> {
+    let read = |from, length| real(line.bytes, from, length, "a length or angle").ok();
     let lengths = [read(6, 9), read(15, 9), read(24, 9)];
     let angles = [read(33, 7), read(40, 7), read(47, 7)];
     let (Some(lengths), Some(angles)) = (all(lengths), all(angles)) else {
-        warnings.push(lines.warning("CRYST1 must hold three lengths and three angles: taken for no cell"));
+        warnings.push(line.warning("CRYST1 must hold three lengths and three angles: taken for no cell"));
         return None;
     };
     if lengths == [1.0; 3] { None } else { Cell::of_angles(lengths, angles) }

@@ -20,11 +20,11 @@ pub fn read(lines: &mut Lines, columns: &Columns) -> Reading<Option<Frame>> {
         version_3(lines, &mut frame, &mut kinds)?;
     } else {
         for index in 0..atoms {
-            lines.need(&format!("atom {} of {atoms}", index + 1))?;
+            lines.need(format_args!("atom {} of {atoms}", index + 1))?;
             atom(lines.line(), &mut frame, &mut kinds).map_err(|slip| lines.slip(slip))?;
         }
         for index in 0..bonds {
-            lines.need(&format!("bond {} of {bonds}", index + 1))?;
+            lines.need(format_args!("bond {} of {bonds}", index + 1))?;
             let pair = [0, 3].map(|from| count(fixed(lines.line(), from, 3)));
             bond(lines, pair, &mut frame)?;
         }

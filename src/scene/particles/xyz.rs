@@ -27,9 +27,10 @@ pub fn read(lines: &mut Lines, columns: &Columns) -> Reading<Option<Frame>> {
         None => plain(lines, columns)?,
     };
     let mut rows = Rows::new(&fields);
-    for index in 0..atoms {
-        lines.need(&format!("atom {} of {atoms}", index + 1))?;
-        rows.read(lines, &mut frame)?;
+    let read = rows.read_parts(lines, atoms, &mut frame, |rows, _, line, frame| rows.read(line, frame).map(|_| ()))?;
+    for index in read..atoms {
+        lines.need(format_args!("atom {} of {atoms}", index + 1))?;
+        rows.read(lines.current(), &mut frame)?;
     }
     rows.finish(lines, &mut frame);
     end(lines)?;
@@ -40,8 +41,8 @@ pub fn read(lines: &mut Lines, columns: &Columns) -> Reading<Option<Frame>> {
 pub fn skip(lines: &mut Lines) -> Reading<bool> {
     let Some(atoms) = atoms(lines)? else { return Ok(false) };
     lines.need("a comment line, which may be empty")?;
-    for index in 0..atoms {
-        lines.need(&format!("atom {} of {atoms}", index + 1))?;
+    for index in lines.parts(atoms, None, |_| (), Ok)?..atoms {
+        lines.need(format_args!("atom {} of {atoms}", index + 1))?;
     }
     end(lines)?;
     Ok(true)

@@ -238,6 +238,9 @@ struct Findings {
 
 fn look_at(shapes: &CloudShapes) -> Findings {
     let mut findings = Findings::default();
+    if matches!(shapes, CloudShapes::Spheres(rows) if rules::are_spheres(rows)) {
+        return findings;
+    }
     for row in 0..shapes.len() {
         let checked = match shapes {
             CloudShapes::Polygons { corners, starts } => {
