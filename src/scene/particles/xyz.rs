@@ -143,30 +143,55 @@ fn value(comment: &str, key: &str) -> Option<(usize, String)> {
     let mut rest = 0;
     while let Some(found) = comment[rest..].find('=') {
         let sign = rest + found;
-        let name = comment[..sign].rsplit(char::is_whitespace).next().unwrap_or_default();
-        let start = sign + 1;
-        let close = match comment[start..].chars().next() {
-            Some('"') => Some('"'),
-            Some('[') => Some(']'),
-            Some('{') => Some('}'),
-            _ => None,
+        let name = comment[rest..sign].trim_end().rsplit(char::is_whitespace).next().unwrap_or_default();
+        let start = comment.len() - comment[sign + 1..].trim_start().len();
+        let inside = extent(&comment[start..]);
+        let after = &comment[start..];
+        // A word in which or behind which there is an equals sign is the next key: this one has no value.
+        let is_key =
+            inside.0 == 0 && (after[..inside.1].contains('=') || after[inside.1..].trim_start().starts_with('='));
+        let (from, to) = match start > sign + 1 && is_key {
+            true => (sign + 1, sign + 1),
+            false => (start + inside.0, start + inside.1),
         };
-        let from = start + usize::from(close.is_some());
-        let ends = |c: char| close.map_or(c.is_whitespace(), |close| c == close);
-        let end = comment[from..].find(ends).map_or(comment.len(), |length| from + length);
         if name.trim_matches('"').eq_ignore_ascii_case(key) {
-            return Some((from, comment[from..end].to_owned()));
+            return Some((from, comment[from..to].to_owned()));
         }
-        rest = end.max(start);
+        rest = to;
     }
     None
 }
 
+/// From where to where the value reaches that a text starts with, without its quotes or outer brackets.
+fn extent(text: &str) -> (usize, usize) {
+    let (open, close) = match text.chars().next() {
+        Some('"') => ('"', '"'),
+        Some('[') => ('[', ']'),
+        Some('{') => ('{', '}'),
+        _ => return (0, text.find(char::is_whitespace).unwrap_or(text.len())),
+    };
+    let (mut depth, mut escaped) = (0, false);
+    for (at, c) in text.char_indices() {
+        match c {
+            _ if std::mem::take(&mut escaped) => {}
+            '\\' if open == '"' => escaped = true,
+            _ if c == close && (depth == 1 || open == close && at > 0) => return (1, at),
+            _ if c == close && open != close => depth -= 1,
+            _ if c == open => depth += 1,
+            _ => {}
+        }
+    }
+    (1, text.len())
+}
+
 fn cell(lines: &Lines, comment: &str) -> Reading<Option<Cell>> {
     let Some((at, text)) = value(comment, "Lattice") else { return Ok(None) };
-    let Some(edges) = reals::<9>(&text) else {
+    let diagonal = |[x, y, z]: [f64; 3]| [x, 0.0, 0.0, 0.0, y, 0.0, 0.0, 0.0, z];
+    let Some(edges) = reals::<9>(&text).or_else(|| reals(&text).map(diagonal)) else {
         let found = format!("{:?}", shorten(&text));
-        return Err(lines.error(at, "Lattice must be nine numbers: the three edges of the cell", found));
+        let rule =
+            "Lattice must be nine numbers, the three edges of the cell, or three, their lengths along x, y and z";
+        return Err(lines.error(at, rule, found));
     };
     let origin = match value(comment, "Origin") {
         None => [0.0; 3],
@@ -189,8 +214,10 @@ fn cell(lines: &Lines, comment: &str) -> Reading<Option<Cell>> {
     }
 }
 
+/// The numbers or words of an array, which may have rows in brackets of their own, or be JSON and say so.
 fn parts(text: &str) -> impl Iterator<Item = &str> {
-    text.split(|c: char| c.is_whitespace() || c == ',').filter(|part| !part.is_empty())
+    let text = text.trim().strip_prefix("_JSON").unwrap_or(text);
+    text.split(|c: char| c.is_whitespace() || matches!(c, ',' | '[' | ']')).filter(|part| !part.is_empty())
 }
 
 fn reals<const N: usize>(text: &str) -> Option<[f64; N]> {
@@ -200,8 +227,8 @@ fn reals<const N: usize>(text: &str) -> Option<[f64; N]> {
 
 fn flags(text: &str) -> Option<[bool; 3]> {
     let flag = |part: &str| match part {
-        "T" | "True" | "true" | "1" => Some(true),
-        "F" | "False" | "false" | "0" => Some(false),
+        "T" | "True" | "true" | "TRUE" | "1" => Some(true),
+        "F" | "False" | "false" | "FALSE" | "0" => Some(false),
         _ => None,
     };
     let values: Option<Vec<bool>> = parts(text).map(flag).collect();
@@ -220,8 +247,40 @@ mod tests {
         assert_eq!(text("Properties").as_deref(), Some("species:S:1:pos:R:3"));
         assert_eq!(text("pbc").map(|text| flags(&text)), Some(Some([true, false, true])));
         assert_eq!(text("Origin"), None);
-        for odd in ["", "=", "===", "a=\"", "é=\"é", "Lattice=[", "= =\"= \"="] {
+        let comment = r#"note="a \"Lattice=1\" b" empty= Lattice = [[1, 0, 0], [0, 2, 0], [0, 0, 3]] pbc=T T"#;
+        let text = |key| value(comment, key).map(|(_, text)| text);
+        assert_eq!(text("Lattice").as_deref(), Some("[1, 0, 0], [0, 2, 0], [0, 0, 3]"));
+        assert_eq!([text("empty").as_deref(), text("pbc").as_deref()], [Some(""), Some("T")]);
+        for odd in ["", "=", "===", "a=\"", "é=\"é", "Lattice=[", "= =\"= \"=", "a=]", "a=[]]", "a= é=\\", "a=\"\\"]
+        {
             let _ = value(odd, "Lattice");
         }
+    }
+
+    /// Every way in which programs write a cell.
+    #[test]
+    fn cells_are_read_in_all_forms() {
+        let folder = tempfile::tempdir().unwrap();
+        let name = folder.path().join("a.xyz");
+        for form in [
+            r#"Lattice="1 0 0 0 2 0 0 0 3""#,
+            r#"lattice="1.0 0 0  0 2 0 0 0 3""#,
+            "Lattice={1 0 0 0 2 0 0 0 3}",
+            "Lattice=[1, 0, 0, 0, 2, 0, 0, 0, 3]",
+            "Lattice=[[1,0,0],[0,2,0],[0,0,3]]",
+            "Lattice = [[1, 0, 0], [0, 2, 0], [0, 0, 3]]",
+            r#"Lattice="[[1,0,0],[0,2,0],[0,0,3]]""#,
+            r#"Lattice="_JSON [[1, 0, 0], [0, 2, 0], [0, 0, 3]]""#,
+            r#"Lattice="1 2 3""#,
+        ] {
+            std::fs::write(&name, format!("1\n{form} pbc=[T, F, TRUE] energy=-1\nC 0 0 0\n")).unwrap();
+            let mut lines = Lines::open(&name).unwrap();
+            let cell = read(&mut lines, &Columns::default()).unwrap().unwrap().cell.unwrap();
+            assert_eq!(cell.edges, DMat3::from_diagonal(DVec3::new(1.0, 2.0, 3.0)), "{form}");
+            assert_eq!(cell.periodic, [true, false, true]);
+        }
+        std::fs::write(&name, "1\nLattice=[[1,0],[0,2]]\nC 0 0 0\n").unwrap();
+        let error = read(&mut Lines::open(&name).unwrap(), &Columns::default()).unwrap_err().to_string();
+        assert!(error.contains("a.xyz:2:10: Lattice must be nine numbers"), "{error}");
     }
 }
