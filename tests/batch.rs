@@ -198,6 +198,21 @@ fn annotations_are_what_the_ids_show() {
     assert!(whole >= 2, "{whole} of {} are seen whole", list.len());
     let k = &page["camera"]["intrinsics"];
     assert_eq!((k[0][2].as_f64(), k[1][2].as_f64()), (Some(80.0), Some(60.0)));
+    // A part of the picture, and more than the picture, have the same objects whole.
+    let shares = |name: &str| -> BTreeMap<u64, f64> {
+        let page = json(&fs::read_to_string(room.path(name)).unwrap());
+        let list = page["annotations"].as_array().unwrap();
+        list.iter().map(|one| (one["id"].as_u64().unwrap(), one["visible_share"].as_f64().unwrap())).collect()
+    };
+    let all = shares("a.json");
+    for (name, option) in [("c", "--crop 40,30,120,90"), ("d", "--overscan 20")] {
+        room.run(&format!("render {file} -o {name}.exr --resolution 160x120 --spp 1 --annotations -q {option}"))
+            .success();
+        let part = shares(&format!("{name}.json"));
+        let whole = part.iter().filter(|(id, share)| all.get(id) == Some(&1.0) && **share == 1.0).count();
+        let hidden = part.iter().filter(|(id, share)| all.get(id) != Some(&1.0) && **share < 1.0).count();
+        assert!(whole >= 1 && hidden >= 1, "{name}: {part:?} of {all:?}");
+    }
 }
 
 #[test]

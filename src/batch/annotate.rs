@@ -1,7 +1,7 @@
 //! Ground truth beside a picture: what is seen where, as JSON after the manner of COCO.
 //!
 //! Boxes and pixel counts are those of the id layer. The visible share of an object is its pixel count over that of the
-//! pixels whose centres would show it if nothing else were there.
+//! pixels of the picture, crop and overscan included, whose centres would show it if nothing else were there.
 //!
 //! Source: Lin et al., "Microsoft COCO: common objects in context", ECCV 2014, and its data format: `images`,
 //! `annotations` with `bbox` as x, y, width and height, `categories`.
@@ -35,7 +35,7 @@ pub fn page(job: &Job, renderer: &Renderer, scene: &Scene, picture: &Picture, na
     let objects = seen.iter().map(|(id, seen)| {
         let primitives = primitives(scene, *id, names);
         let (place, material) = (place(scene, &primitives), primitives.first().map(|first| material(scene, *first)));
-        let alone = alone(renderer, scene, &primitives);
+        let alone = alone(renderer, picture.window, scene, &primitives);
         let share = alone.map(|alone| (seen.pixels as f64 / alone.max(seen.pixels) as f64).min(1.0));
         let Window { x0, y0, .. } = seen.window;
         json!({
@@ -124,11 +124,10 @@ fn balls(scene: &Scene, primitives: &[usize]) -> Vec<(DVec3, f64)> {
     balls
 }
 
-/// Pixels whose centres show the object where it is alone; `None` where that takes too long.
-fn alone(renderer: &Renderer, scene: &Scene, primitives: &[usize]) -> Option<u64> {
+/// Pixels of a window whose centres show the object where it is alone; `None` where that takes too long.
+fn alone(renderer: &Renderer, window: Window, scene: &Scene, primitives: &[usize]) -> Option<u64> {
     let display = (renderer.image().width, renderer.image().height);
-    let full = Window::full(display);
-    let window = reach(renderer.view(), display, &balls(scene, primitives)).unwrap_or(full);
+    let window = reach(renderer.view(), display, window, &balls(scene, primitives)).unwrap_or(window);
     if window.area().saturating_mul(primitives.len()) > MOST_TESTS {
         return None;
     }
@@ -148,9 +147,9 @@ fn alone(renderer: &Renderer, scene: &Scene, primitives: &[usize]) -> Option<u64
     Some((window.y0..window.y1).map(|y| (window.x0..window.x1).map(|x| shows(x, y)).sum::<u64>()).sum())
 }
 
-/// The pixels that may show what is in the balls; `None` where they reach behind the eye, or the lens is not that of a
-/// pinhole.
-fn reach(camera: &Camera, (width, height): (u32, u32), balls: &[(DVec3, f64)]) -> Option<Window> {
+/// The pixels of a window that may show what is in the balls; `None` where they reach behind the eye, or the lens is not
+/// that of a pinhole.
+fn reach(camera: &Camera, (width, height): (u32, u32), full: Window, balls: &[(DVec3, f64)]) -> Option<Window> {
     let Lens::Pinhole { vfov } = camera.lens else { return None };
     let scale = f64::from(height) / 2.0 / (vfov.to_radians() / 2.0).tan();
     let (right, up, forward) = camera.axes();
@@ -173,12 +172,12 @@ fn reach(camera: &Camera, (width, height): (u32, u32), balls: &[(DVec3, f64)]) -
             }
         }
     }
-    let edge = |place: f64, side: u32| place.clamp(0.0, f64::from(side)) as i32;
+    let edge = |place: f64, low: i32, high: i32| place.clamp(f64::from(low), f64::from(high)) as i32;
     let window = Window {
-        x0: edge(least[0].floor(), width),
-        y0: edge(least[1].floor(), height),
-        x1: edge(most[0].ceil(), width),
-        y1: edge(most[1].ceil(), height),
+        x0: edge(least[0].floor(), full.x0, full.x1),
+        y0: edge(least[1].floor(), full.y0, full.y1),
+        x1: edge(most[0].ceil(), full.x0, full.x1),
+        y1: edge(most[1].ceil(), full.y0, full.y1),
     };
     (!balls.is_empty()).then_some(window)
 }
