@@ -3,7 +3,8 @@
 //! A job says what is different from the defaults: its scene, camera (by name, or as a table as in a scene), frame or
 //! frames, size, samples, seed, output. Scenes are relative to the file that names them.
 
-use std::path::{Path, PathBuf};
+use std::fmt;
+use std::path::{Component, Path, PathBuf};
 
 use serde::Deserialize;
 use thiserror::Error;
@@ -14,7 +15,7 @@ use crate::film::Window;
 use crate::output::Format;
 use crate::scene::{Integrator, Scene};
 
-/// A list that cannot be used: where, and why.
+/// A mistake in a list: where, and why.
 #[derive(Debug, Error)]
 #[error("{place}: {text}")]
 pub struct ManifestError {
@@ -22,6 +23,26 @@ pub struct ManifestError {
     pub place: String,
     /// What is wrong, and what would be right.
     pub text: String,
+}
+
+/// A list that cannot be used: all its mistakes.
+#[derive(Debug, Error)]
+pub struct ManifestErrors(pub Vec<ManifestError>);
+
+/// Most mistakes that are shown.
+const MOST_SHOWN: usize = 50;
+
+impl fmt::Display for ManifestErrors {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, error) in self.0.iter().take(MOST_SHOWN).enumerate() {
+            let separator = if index == 0 { "" } else { "\n" };
+            write!(f, "{separator}{error}")?;
+        }
+        match self.0.len().saturating_sub(MOST_SHOWN) {
+            0 => Ok(()),
+            more => write!(f, "\n{more} more mistakes"),
+        }
+    }
 }
 
 /// What a job, or the defaults of a list, may say.
@@ -53,59 +74,105 @@ struct Manifest {
     jobs: Vec<toml::Spanned<toml::Value>>,
 }
 
-/// Reads a list. `base` has what no job says, its scene and output are not used; `out_dir` is where relative outputs
-/// start; `pattern` names the pictures of jobs that do not.
+/// Reads a list. `base` has what no job says, its scene and output are not used; `out_dir` is where outputs start, and
+/// where they must stay if one is given; `pattern` names the pictures of jobs that do not.
 ///
 /// # Errors
-/// The first job that cannot be understood.
-pub fn read(path: &Path, text: &str, base: &Job, out_dir: &Path, pattern: &str) -> Result<Vec<Job>, ManifestError> {
+/// All jobs that cannot be understood, by line.
+pub fn read(
+    path: &Path,
+    text: &str,
+    base: &Job,
+    out_dir: Option<&Path>,
+    pattern: &str,
+) -> Result<Vec<Job>, ManifestErrors> {
     let is_toml = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
-    let entries = if is_toml { from_toml(path, text)? } else { from_lines(path, text)? };
+    let mut errors = Vec::new();
+    let mut fail = |line: usize, text: String| {
+        errors.push((line, ManifestError { place: format!("{}:{line}", path.display()), text }));
+    };
+    let entries = if is_toml { from_toml(text, &mut fail) } else { from_lines(text, &mut fail) };
     let reader = Reader { base, folder: path.parent().unwrap_or(Path::new("")), out_dir, pattern };
     let mut jobs = Vec::new();
     for (line, entry) in entries {
-        let more = reader.jobs(entry, jobs.len());
-        jobs.extend(more.map_err(|text| ManifestError { place: format!("{}:{line}", path.display()), text })?);
-    }
-    Ok(jobs)
-}
-
-fn from_toml(path: &Path, text: &str) -> Result<Vec<(usize, Entry)>, ManifestError> {
-    let line = |at: usize| text.as_bytes()[..at.min(text.len())].iter().filter(|byte| **byte == b'\n').count() + 1;
-    let fail = |at: usize, error: toml::de::Error| {
-        let place = format!("{}:{}", path.display(), line(error.span().map_or(at, |span| span.start)));
-        ManifestError { place, text: error.message().to_owned() }
-    };
-    let manifest: Manifest = toml::from_str(text).map_err(|error| fail(0, error))?;
-    let entry = |job: toml::Spanned<toml::Value>| {
-        let at = job.span().start;
-        let entry: Entry = job.into_inner().try_into().map_err(|error| fail(at, error))?;
-        Ok((line(at), entry.or(&manifest.defaults)))
-    };
-    manifest.jobs.into_iter().map(entry).collect()
-}
-
-fn from_lines(path: &Path, text: &str) -> Result<Vec<(usize, Entry)>, ManifestError> {
-    let (mut defaults, mut entries) = (Entry::default(), Vec::new());
-    for (line, words) in text.lines().enumerate().filter(|(_, words)| !words.trim().is_empty()) {
-        let fail = |error: serde_json::Error| {
-            let place = format!("{}:{}", path.display(), line + 1);
-            ManifestError { place, text: error.to_string() }
-        };
-        #[derive(Deserialize)]
-        #[serde(deny_unknown_fields)]
-        struct Defaults {
-            defaults: Entry,
+        match reader.jobs(entry, jobs.len()) {
+            Ok(more) => jobs.extend(more),
+            Err(text) => fail(line, text),
         }
-        match serde_json::from_str::<Defaults>(words) {
-            Ok(found) => defaults = found.defaults,
-            Err(_) => {
-                let entry: Entry = serde_json::from_str(words).map_err(fail)?;
-                entries.push((line + 1, entry.or(&defaults)));
+    }
+    errors.sort_by_key(|(line, _)| *line);
+    match errors.is_empty() {
+        true => Ok(jobs),
+        false => Err(ManifestErrors(errors.into_iter().map(|(_, error)| error).collect())),
+    }
+}
+
+/// Entries by line; `fail` gets the mistakes.
+fn from_toml(text: &str, fail: &mut impl FnMut(usize, String)) -> Vec<(usize, Entry)> {
+    let line = |at: usize| text.as_bytes()[..at.min(text.len())].iter().filter(|byte| **byte == b'\n').count() + 1;
+    let place = |at: usize, error: &toml::de::Error| line(error.span().map_or(at, |span| span.start));
+    let manifest: Manifest = match toml::from_str(text) {
+        Ok(manifest) => manifest,
+        Err(error) => {
+            fail(place(0, &error), error.message().to_owned());
+            return Vec::new();
+        }
+    };
+    let mut entries = Vec::new();
+    for job in manifest.jobs {
+        let at = job.span().start;
+        match job.into_inner().try_into::<Entry>() {
+            Ok(entry) => entries.push((line(at), entry.or(&manifest.defaults))),
+            Err(error) => fail(place(at, &error), error.message().to_owned()),
+        }
+    }
+    entries
+}
+
+/// Entries by line; `fail` gets the mistakes. Behind defaults that are none, nothing is read.
+fn from_lines(text: &str, fail: &mut impl FnMut(usize, String)) -> Vec<(usize, Entry)> {
+    #[derive(Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Defaults {
+        defaults: Entry,
+    }
+    let (mut defaults, mut entries) = (Entry::default(), Vec::new());
+    for (index, words) in text.lines().enumerate().filter(|(_, words)| !words.trim().is_empty()) {
+        let has_defaults =
+            || serde_json::from_str::<serde_json::Value>(words).is_ok_and(|job| job.get("defaults").is_some());
+        match (serde_json::from_str::<Entry>(words), serde_json::from_str::<Defaults>(words)) {
+            (Ok(entry), _) => entries.push((index + 1, entry.or(&defaults))),
+            (_, Ok(found)) => defaults = found.defaults,
+            (_, Err(error)) if has_defaults() => {
+                fail(index + 1, message(&error));
+                break;
+            }
+            (Err(error), _) => fail(index + 1, message(&error)),
+        }
+    }
+    entries
+}
+
+/// What is wrong with a line, which is all that its reader saw.
+fn message(error: &serde_json::Error) -> String {
+    let text = error.to_string();
+    let place = format!(" at line {} column {}", error.line(), error.column());
+    format!("{} (column {})", text.strip_suffix(&place).unwrap_or(&text), error.column())
+}
+
+/// Whether a file lies in a folder, by their names.
+fn is_inside(folder: &Path, file: &Path) -> bool {
+    let plain = |path: &Path| {
+        let mut plain = PathBuf::new();
+        for part in std::path::absolute(path).unwrap_or_else(|_| path.to_owned()).components() {
+            match part {
+                Component::ParentDir => _ = plain.pop(),
+                part => plain.push(part),
             }
         }
-    }
-    Ok(entries)
+        plain
+    };
+    plain(file).starts_with(plain(folder))
 }
 
 impl Entry {
@@ -137,7 +204,7 @@ impl Entry {
 struct Reader<'a> {
     base: &'a Job,
     folder: &'a Path,
-    out_dir: &'a Path,
+    out_dir: Option<&'a Path>,
     pattern: &'a str,
 }
 
@@ -179,7 +246,12 @@ impl Reader<'_> {
         let many = frames.len() > 1;
         let one = |(index, frame): (usize, Option<i64>)| {
             let mut job = Job { frame, ..job.clone() };
-            job.output = self.out_dir.join(names::name(&pattern, &job, first + index + 1, many)?);
+            let name = names::name(&pattern, &job, first + index + 1, many)?;
+            job.output = self.out_dir.unwrap_or(Path::new(".")).join(&name);
+            if self.out_dir.is_some_and(|folder| !is_inside(folder, &job.output)) {
+                let rule = "the output should stay in the directory that --out-dir names";
+                return Err(format!("{}: {rule}; without it, it may be anywhere", name.display()));
+            }
             job.format = Format::of(&job.output)
                 .ok_or_else(|| format!("{}: the output should end in .exr or .png", job.output.display()))?;
             Ok(job)
@@ -248,7 +320,7 @@ mod tests {
     }
 
     fn jobs(name: &str, text: &str) -> Result<Vec<Job>, String> {
-        let jobs = read(Path::new(name), text, &base(), Path::new("out"), "{scene}.{job}.exr");
+        let jobs = read(Path::new(name), text, &base(), Some(Path::new("out")), "{scene}.{job}.exr");
         jobs.map_err(|error| error.to_string())
     }
 
@@ -291,6 +363,18 @@ spp = 1
     }
 
     #[test]
+    fn outputs_stay_in_a_folder_that_is_given() {
+        let out = std::path::absolute("out/a.exr").unwrap().display().to_string();
+        for output in ["a.exr", "x/../a.exr", "./x//a.exr", "..a/a.exr", &out] {
+            let text = format!("{{\"scene\": \"a.toml\", \"output\": {output:?}}}");
+            assert!(jobs("j", &text).is_ok(), "{output}");
+        }
+        let text = r#"{"scene": "a.toml", "output": "../a.exr"}"#;
+        let jobs = read(Path::new("j"), text, &base(), None, "").unwrap();
+        assert_eq!(jobs[0].output, Path::new("./../a.exr"), "without one they start here and may be anywhere");
+    }
+
+    #[test]
     fn what_is_wrong_is_said_with_its_line() {
         let wrong = [
             ("{\"scene\": \"a.toml\"}\n{\"scene\": 5}\n", "j:2: "),
@@ -308,11 +392,25 @@ spp = 1
             ),
             ("{\"scene\": \"a.toml\", \"integrator\": \"magic\"}", "integrator"),
             ("nonsense", "j:1: "),
+            ("{\"scene\": \"a.toml\", \"spp\": \"x\"}", "expected u32 (column 30)"),
+            ("{\"defaults\": {\"sp\": 5}}\n{\"spp\": 5}", "unknown field `sp`"),
+            ("{\"scene\": \"a.toml\", \"output\": \"../a.exr\"}", "../a.exr: the output should stay in the directory"),
+            ("{\"scene\": \"a.toml\", \"output\": \"/a.exr\"}", "the output should stay in the directory"),
+            ("{\"scene\": \"a.toml\", \"output\": \"x/../../out2/a.exr\"}", "the output should stay in the directory"),
         ];
         for (text, want) in wrong {
             let error = jobs("j", text).unwrap_err();
             assert!(error.contains(want), "{text}: {error}");
         }
+        let error = jobs("j", "{\"spp\": 1}\n\n{\"scene\": 5}\n{\"scene\": \"a\"}\n{\"scene\": \"a\", \"spp\": 0}")
+            .unwrap_err();
+        let lines: Vec<&str> = error.lines().map(|line| &line[..4]).collect();
+        assert_eq!(lines, ["j:1:", "j:3:", "j:5:"], "{error}");
+        let error =
+            jobs("j.toml", "[[jobs]]\nspp = 5\n[[jobs]]\nsp = 5\n[[jobs]]\nscene = \"a\"\nspp = 0\n").unwrap_err();
+        assert_eq!(error.lines().count(), 3, "{error}");
+        let many = jobs("j", &"{\"scene\": 5}\n".repeat(60)).unwrap_err();
+        assert!(many.lines().count() == 51 && many.ends_with("10 more mistakes"), "{many}");
         let error = jobs("a/j.toml", "[[jobs]]\nscene = \"a\"\n[[jobs]]\nsp = 5\n").unwrap_err();
         assert!(error.starts_with("a/j.toml:3") || error.starts_with("a/j.toml:4"), "{error}");
     }

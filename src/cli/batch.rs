@@ -30,9 +30,10 @@ Examples:
 pub struct Args {
     /// List of jobs: .toml, anything else is JSON lines; - is standard input
     list: PathBuf,
-    /// Directory for the pictures, made where it is missing
-    #[arg(long, value_name = "DIR", default_value = ".")]
-    out_dir: PathBuf,
+    /// Directory for the pictures, made where it is missing; an output that leaves it is refused [default: outputs start
+    /// here and may be anywhere]
+    #[arg(long, value_name = "DIR")]
+    out_dir: Option<PathBuf>,
     /// Names of pictures whose jobs give none; {scene}, {camera}, {job} and #### stand for what differs
     #[arg(long, value_name = "PATTERN", default_value = "{scene}.{job}.exr")]
     name: String,
@@ -50,7 +51,7 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
     args.running.threads.rule();
     let text = read(&args.list)?;
     let base = args.settings.job(PathBuf::new())?;
-    let jobs = manifest::read(&args.list, &text, &base, &args.out_dir, &args.name)
+    let jobs = manifest::read(&args.list, &text, &base, args.out_dir.as_deref(), &args.name)
         .map_err(|error| Failure::new(Exit::Input, error))?;
     if jobs.is_empty() {
         return Err(Failure::new(Exit::Input, "there is no job in it").of(&args.list));
