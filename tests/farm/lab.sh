@@ -3,6 +3,7 @@
 #   lab.sh up | down           starts and stops it; `up` refuses to touch a configuration that it did not write
 #   lab.sh lose NODE           ends all processes of a node at once, as where the power goes: lab1 or lab2
 #   lab.sh join NODE           starts it again
+# A requeued task waits for as long as its credential lasts: seconds here, two minutes where nothing is said.
 # A node is a slurmd in a process namespace of its own, whose processes end with it.
 set -e
 host=$(hostname -s)
@@ -46,8 +47,9 @@ SelectTypeParameters=CR_Core
 SlurmdParameters=config_overrides
 ReturnToService=2
 KillWait=5
+AuthInfo=cred_expire=5
 SlurmdTimeout=10
-SchedulerParameters=sched_min_interval=100000,requeue_setup_env_fail
+SchedulerParameters=sched_min_interval=100000,sched_interval=2,bf_interval=2,requeue_setup_env_fail
 NodeName=lab1 NodeHostname=$host NodeAddr=127.0.0.1 Port=17011 CPUs=$cpus State=UNKNOWN
 NodeName=lab2 NodeHostname=$host NodeAddr=127.0.0.1 Port=17012 CPUs=$cpus State=UNKNOWN
 PartitionName=main Nodes=lab1,lab2 Default=YES MaxTime=INFINITE State=UP

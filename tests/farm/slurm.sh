@@ -19,7 +19,7 @@ source "$here/../survive/scene.sh"
 failures=0
 fail() { echo "  FAILED: $*"; failures=$((failures + 1)); }
 
-# $1: the last job. Waits for it, for five minutes at the most: a requeued task begins after two.
+# $1: the last job. Waits for it, for five minutes at the most.
 await() {
   for _ in $(seq 1500); do
     [ -z "$(squeue -h -j "$1" 2>/dev/null)" ] && return
