@@ -197,33 +197,37 @@ fn both_engines_give_the_same_layers() {
         let single = render(&scene, layers, |renderer| renderer.engine(Engine::Single)).picture;
         assert_eq!(bits(&ours), bits(&single));
         let theirs = render(&scene, layers, |renderer| renderer.engine(Engine::Reference)).picture;
-        assert_eq!(ours.cryptomattes, theirs.cryptomattes);
-        let names = |picture: &Picture| picture.channels.iter().map(|c| c.name.clone()).collect::<Vec<_>>();
-        assert_eq!(names(&ours), names(&theirs));
-        let mut compared = 0;
-        for (a, b) in ours.channels.iter().zip(&theirs.channels) {
-            let different = match (&a.samples, &b.samples) {
-                (Samples::Uint(a), Samples::Uint(b)) => a.iter().zip(b).filter(|(a, b)| a != b).count(),
-                (Samples::Half(a), Samples::Half(b)) => {
-                    // What differs by so little is rounded to the same half or the next one; 0 has neighbours of both signs.
-                    let far = |(a, b): (&f16, &f16)| {
-                        let apart = i32::from(a.to_bits()).abs_diff(i32::from(b.to_bits()));
-                        apart > 1 && (a.to_f32() - b.to_f32()).abs() > 2e-5 * 0.05
-                    };
-                    a.iter().zip(b).filter(|pair| far(*pair)).count()
-                }
-                (Samples::Float(a), Samples::Float(b)) => {
-                    let far =
-                        |(a, b): (&f32, &f32)| a.to_bits() != b.to_bits() && (a - b).abs() > 2e-5 * b.abs().max(0.05);
-                    a.iter().zip(b).filter(|pair| far(*pair)).count()
-                }
-                other => panic!("{other:?}"),
-            };
-            assert!(different <= 2, "{}: {different} pixels", a.name);
-            compared += a.samples.len();
-        }
-        assert!(compared > 100_000);
+        assert!(alike(&ours, &theirs) > 100_000);
     }
+}
+
+/// Makes sure that two pictures have the same channels, but for some roundings and two pixels: how many samples those have.
+fn alike(ours: &Picture, theirs: &Picture) -> usize {
+    assert_eq!(ours.cryptomattes, theirs.cryptomattes);
+    let names = |picture: &Picture| picture.channels.iter().map(|c| c.name.clone()).collect::<Vec<_>>();
+    assert_eq!(names(ours), names(theirs));
+    let mut compared = 0;
+    for (a, b) in ours.channels.iter().zip(&theirs.channels) {
+        let different = match (&a.samples, &b.samples) {
+            (Samples::Uint(a), Samples::Uint(b)) => a.iter().zip(b).filter(|(a, b)| a != b).count(),
+            (Samples::Half(a), Samples::Half(b)) => {
+                // What differs by so little is rounded to the same half or the next one; 0 has neighbours of both signs.
+                let far = |(a, b): (&f16, &f16)| {
+                    let apart = i32::from(a.to_bits()).abs_diff(i32::from(b.to_bits()));
+                    apart > 1 && (a.to_f32() - b.to_f32()).abs() > 2e-5 * 0.05
+                };
+                a.iter().zip(b).filter(|pair| far(*pair)).count()
+            }
+            (Samples::Float(a), Samples::Float(b)) => {
+                let far = |(a, b): (&f32, &f32)| a.to_bits() != b.to_bits() && (a - b).abs() > 2e-5 * b.abs().max(0.05);
+                a.iter().zip(b).filter(|pair| far(*pair)).count()
+            }
+            other => panic!("{other:?}"),
+        };
+        assert!(different <= 2, "{}: {different} pixels", a.name);
+        compared += a.samples.len();
+    }
+    compared
 }
 
 #[test]
@@ -294,6 +298,45 @@ fn mattes_cover_what_is_seen() {
     assert_eq!(names(2), ["default", "front"]);
     assert_eq!(names(1), ["chrome", "glass", "gloss", "red", "squares"]);
     assert!(names(0).contains(&"dust:17") && names(0).contains(&"ball") && !names(0).contains(&"dust"));
+}
+
+/// Lights that are seen are objects of their own: they have coverage, numbers, depth and place, in both engines.
+#[test]
+fn lights_that_are_seen_have_ids() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/area_lights.toml");
+    let mut scene = Scene::load(&path).unwrap();
+    scene.background.transparent = true;
+    for spp in [1, 5, 16] {
+        let all = everything();
+        let ours = render(&scene, all, |renderer| renderer.resolution(96, 60).spp(spp));
+        let theirs = render(&scene, all, |renderer| renderer.resolution(96, 60).spp(spp).engine(Engine::Reference));
+        // The light itself is noise, the same in both but for roundings that a variance may magnify.
+        let only = |mut picture: Picture| {
+            picture.channels.retain(|channel| channel.layer() != "variance");
+            picture
+        };
+        let (ours, theirs) = ((only(ours.picture), ours.names), (only(theirs.picture), theirs.names));
+        assert!(alike(&ours.0, &theirs.0) > 100_000 && ours.1 == theirs.1, "{spp}");
+        let (picture, names) = ours;
+        let named = |table: &std::collections::BTreeMap<u32, String>, name: &str| table.values().any(|n| n == name);
+        for name in ["bulb", "spot", "panel"] {
+            assert!(picture.cryptomattes[..2].iter().all(|matte| matte.manifest.contains_key(name)), "{name}");
+            assert!(named(&names.object, name) && named(&names.material, name), "{name}");
+        }
+        let lit = |name: &str| *names.object.iter().find(|(_, n)| *n == name).unwrap().0;
+        let (depth, objects) = (floats(&picture, "depth.Z"), ids(&picture, "id.object"));
+        let place = ["P.X", "P.Y", "P.Z"].map(|name| floats(&picture, name));
+        for (index, pixel) in picture.pixels.iter().enumerate() {
+            let shares = (0..6).map(|rank| format!("crypto_object{:02}.{}", rank / 2, ["G", "A"][rank % 2]));
+            let sum: f32 = shares.map(|name| floats(&picture, &name)[index]).sum();
+            assert!((sum - pixel[3]).abs() < 1e-6, "{sum} {}", pixel[3]);
+            assert_eq!(objects[index] == 0, depth[index] == 1e10);
+            if objects[index] == lit("bulb") {
+                let off = [place[0][index] + 2.6, place[1][index] - 2.6, place[2][index] - 0.4];
+                assert!((off.iter().map(|x| x * x).sum::<f32>().sqrt() - 0.3).abs() < 1e-4, "{off:?}");
+            }
+        }
+    }
 }
 
 /// The variance layer against the scatter of the same pixels under other seeds.

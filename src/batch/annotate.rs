@@ -32,8 +32,9 @@ struct Seen {
 pub fn page(job: &Job, renderer: &Renderer, scene: &Scene, picture: &Picture, names: &IdNames) -> String {
     let seen = seen(picture);
     let frame = job.frame();
-    let objects = seen.iter().map(|(id, seen)| {
-        let primitives = primitives(scene, *id, names);
+    // Lights are seen as well, and are no objects.
+    let shown = seen.iter().map(|(id, seen)| (id, seen, primitives(scene, *id, names)));
+    let objects = shown.filter(|(_, _, primitives)| !primitives.is_empty()).map(|(id, seen, primitives)| {
         let (place, material) = (place(scene, &primitives), primitives.first().map(|first| material(scene, *first)));
         let alone = alone(renderer, picture.window, scene, &primitives);
         let share = alone.map(|alone| (seen.pixels as f64 / alone.max(seen.pixels) as f64).min(1.0));

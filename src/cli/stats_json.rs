@@ -130,6 +130,10 @@ pub fn of_jobs(jobs: &[Job], reports: &[(usize, Report)], many: bool, run: &Run)
     let mut stats = common(run, reports.first().map_or(0, |(_, report)| report.stats.threads), &sum);
     if let ([report], false) = (reports, many) {
         one(report, &mut stats);
+        // Told where there are such samples.
+        if report.1.losses.clamped > 0 {
+            stats.insert("clamped".to_owned(), json!(report.1.losses.clamped));
+        }
     }
     add_memory(&mut stats, most(|report| report.stats.column_bytes), most(|report| report.stats.tree_bytes));
     if many {

@@ -8,7 +8,7 @@ use super::camera::Samples8;
 use super::direct::{Direct, Sink};
 use super::hits::Shaded;
 use super::lights::Hits;
-use super::record::{RayKind, Record};
+use super::record::{Lit, RayKind, Record};
 use super::shadows::{Share, own};
 use super::wave::Wave;
 use crate::accel::{PACKETS, Tree};
@@ -177,14 +177,18 @@ impl Direct<'_> {
         }
         tree.closest_tiles(from_mut(sink.scratch), sink.walk);
         for p in (0..PACKETS).filter(|p| live[*p] != 0) {
-            let mut radiance = [[0.0; 3]; LANES];
+            let (mut radiance, mut lights) = ([[0.0; 3]; LANES], [None; LANES]);
             for i in bits(live[p]) {
                 let row = sink.scratch.hit(p, i);
                 let Some(kind) = row.kind() else { continue };
                 let place = places[tree.stores().owner(kind, row.row()).primitive as usize];
                 let area = &self.lamps.areas[place];
                 (radiance[i], taken[p]) = (area.radiance, taken[p] | 1 << i);
+                lights[i] = Some(area.index);
                 sink.record.seen(area.index, wave.slot(p, i), wave.path(p, i));
+            }
+            if R::SURFACES && wave.depth == 1 && taken[p] != 0 {
+                sink.record.lamps(&Lit { packet: p, rays: &sink.scratch.packets[p], lights });
             }
             sink.radiance[p] = wave.weighted(p, Vec3x8::from_fn(|i| radiance[i]));
         }

@@ -15,5 +15,5 @@ mod wave;
 pub use self::camera::{CameraRays, PixelPattern, Samples8};
 pub use self::direct::{Direct, Room, Samples};
 pub use self::lamps::Lamps;
-pub use self::record::{RayCounts, RayKind, Record, Seen, Silent, Spent, Summed, Taken};
+pub use self::record::{Lit, RayCounts, RayKind, Record, Seen, Silent, Spent, Summed, Taken};
 pub use self::wave::{WAVE, Wave};

@@ -109,6 +109,8 @@ pub trait Record {
     fn taken(&mut self, _: &Taken) {}
     /// Camera rays of one packet of that tile met surfaces.
     fn surface(&mut self, _: &Seen) {}
+    /// Camera rays of one packet of that tile met lights themselves.
+    fn lamps(&mut self, _: &Lit) {}
     /// All that goes on from some tiles is known.
     fn summed(&mut self, _: &Summed) {}
     /// What some samples took; a sample may be told of more than once.
@@ -134,6 +136,17 @@ pub struct Seen<'a> {
     pub normal: Vec3x8,
     /// The materials' numbers.
     pub bsdf: &'a Bsdf8,
+}
+
+/// The lights that camera rays of a packet met.
+#[derive(Debug, Clone, Copy)]
+pub struct Lit<'a> {
+    /// Its place in the tile.
+    pub packet: usize,
+    /// The rays, ending where they met a light, if they did.
+    pub rays: &'a RayPacket,
+    /// Indices of the lights.
+    pub lights: [Option<usize>; LANES],
 }
 
 /// The samples of a tile of camera rays.

@@ -54,6 +54,19 @@ pub struct CameraSample {
     pub radiance: DVec3,
     /// What its camera ray met.
     pub first: Option<First>,
+    /// The light that it met instead.
+    pub light: Option<SeenLight>,
+}
+
+/// A light that a camera ray met.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SeenLight {
+    /// Its index.
+    pub index: usize,
+    /// On it, relative to the origin of the tracer.
+    pub point: DVec3,
+    /// Along the view axis.
+    pub depth: f64,
 }
 
 /// What a camera ray met.
@@ -199,7 +212,12 @@ impl Walk<'_> {
             let far = hit.as_ref().map_or(f64::INFINITY, |hit| hit.t);
             if step.kind == EventKind::Bounce {
                 radiance += step.weight * self.scattered_light(&step, far);
-            } else if let Some((index, seen)) = self.light_seen(&step, far) {
+            } else if let Some((index, t, seen)) = self.light_seen(&step, far) {
+                if step.depth == 1 {
+                    let (point, depth) = (step.ray.origin + t * step.ray.dir, t * self.view.depth_scale(step.ray.dir));
+                    self.pixel.samples[(self.sample - self.pixel.first) as usize].light =
+                        Some(SeenLight { index, point, depth });
+                }
                 self.event(&step, EventKind::Light(index as u32), 2);
                 radiance += step.weight * seen;
                 continue;

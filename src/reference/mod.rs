@@ -49,7 +49,7 @@ use self::margin::Found;
 use crate::scene::{Background, Light, Material, Scene, Sky, Texture, Visible};
 
 pub use self::camera::View;
-pub use self::integrator::{CameraSample, Event, EventKind, First, Pixel, RayCounts};
+pub use self::integrator::{CameraSample, Event, EventKind, First, Pixel, RayCounts, SeenLight};
 pub use self::margin::{Place, TOLERANCE, U, U64, Verdict};
 
 /// Places closer than this share of their `t` may be such as f64 cannot tell apart.

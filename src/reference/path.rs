@@ -50,12 +50,12 @@ impl Walk<'_> {
     }
 
     /// The nearest visible light that a ray of another kind meets before `t_max`: its index and radiance.
-    pub(super) fn light_seen(&self, step: &Step, t_max: f64) -> Option<(usize, DVec3)> {
+    pub(super) fn light_seen(&self, step: &Step, t_max: f64) -> Option<(usize, f64, DVec3)> {
         let mut nearest = (t_max * (1.0 + NEARER), None);
         for (i, area) in self.tracer.areas.iter().enumerate() {
             let Some(area) = area.as_ref().filter(|area| area.visible) else { continue };
             if let Some((t, _)) = area.meet(&step.ray, nearest.0).filter(|(t, _)| *t < nearest.0) {
-                nearest = (t, Some((i, area.radiance)));
+                nearest = (t, Some((i, t, area.radiance)));
             }
         }
         nearest.1

@@ -10,6 +10,7 @@ use crate::film::Window;
 use crate::integrate::{RayCounts, RayKind};
 use crate::plan::Kind;
 use crate::reference::{EventKind, Pixel, Reference, View};
+use crate::scene::Aov;
 use crate::shapes::RowRef;
 
 /// A frame whose rows are its blocks. There are no columns, no tree and no tests to count; of the shadow rays it is
@@ -101,6 +102,11 @@ fn add_layers(plan: &LayerPlan, sums: &mut Sums, index: usize, pixel: &Pixel) {
         if sums.want_variance() {
             sums.add_radiance(index, seen.radiance.as_vec3().to_array());
         }
+        if let Some(light) = &seen.light {
+            let near = Near::light(0.0, plan.light_key(Aov::CryptoMaterial, light.index), sample as u32);
+            let nearest = (nearest(pixel) == Some(sample)).then_some((near, light.depth as f32));
+            sums.add_light(plan, index, light.index, nearest);
+        }
         let Some(first) = &seen.first else { continue };
         let (primitive, material) = (first.primitive as u32, first.material as u32);
         sums.filtered.add(index, first.normal, first.albedo);
@@ -124,7 +130,11 @@ fn nearest(pixel: &Pixel) -> Option<usize> {
 
 /// Where the nearest sample sees something.
 fn place(pixel: &Pixel, origin: DVec3) -> Place {
-    let first = nearest(pixel).and_then(|sample| pixel.samples[sample].first.as_ref());
+    let nearest = nearest(pixel).map(|sample| &pixel.samples[sample]);
+    if let Some(light) = nearest.and_then(|sample| sample.light) {
+        return Place { point: light.point + origin, ..Place::NONE };
+    }
+    let first = nearest.and_then(|sample| sample.first.as_ref());
     first.map_or(Place::NONE, |first| Place { point: first.point + origin, uv: first.uv, margin: first.margin })
 }
 

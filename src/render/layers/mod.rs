@@ -66,7 +66,10 @@ impl<'s> LayerPlan<'s> {
         let mut plan =
             LayerPlan { layers, scene, camera, display, next, moments, spp, objects, ids: Default::default() };
         plan.ids = Aov::CRYPTOMATTES.map(|aov| match layers.has(aov) {
-            true => (0..plan.keys(aov)).into_par_iter().map(|key| Cryptomatte::id(&plan.name(aov, key))).collect(),
+            true => {
+                let keys = plan.keys(aov) + scene.lights.len() as u32;
+                (0..keys).into_par_iter().map(|key| Cryptomatte::id(&plan.name(aov, key))).collect()
+            }
             false => Vec::new(),
         });
         plan
@@ -76,18 +79,23 @@ impl<'s> LayerPlan<'s> {
     fn motion(&self, near: &Near, point: DVec3) -> [f32; 2] {
         let primitive = near.primitive;
         let seen = self.moments.get(shutter::moment(near.sample, self.moments.len().max(1), self.spp));
+        // Lights stay where they are.
+        let carried = |from: &Scene, to: &Scene, point: DVec3| match near.is_light() {
+            true => point,
+            false => carried(from, to, primitive as usize, point),
+        };
         // From where it was when the sample saw it.
-        let point = seen.map_or(point, |seen| carried(seen, self.scene, primitive as usize, point));
+        let point = seen.map_or(point, |seen| carried(seen, self.scene, point));
         let way = || {
             let (next, camera) = self.next?;
             let before = self.camera.project(self.display, point)?;
-            let after = carried(self.scene, next, primitive as usize, point);
+            let after = carried(self.scene, next, point);
             Some(self.camera.motion(self.display, before, camera.project(self.display, after)?))
         };
         way().unwrap_or_default().as_vec2().to_array()
     }
 
-    /// How many names a Cryptomatte may hold.
+    /// How many names a Cryptomatte may hold, lights left out.
     fn keys(&self, aov: Aov) -> u32 {
         match aov {
             Aov::CryptoMaterial => self.scene.materials.len() as u32,
@@ -96,8 +104,17 @@ impl<'s> LayerPlan<'s> {
         }
     }
 
+    /// The key of a light: behind those of objects and of materials, in no group.
+    pub fn light_key(&self, aov: Aov, light: usize) -> u32 {
+        if aov == Aov::CryptoGroup { 0 } else { self.keys(aov) + light as u32 }
+    }
+
     /// The name behind a key of a Cryptomatte.
     fn name(&self, aov: Aov, key: u32) -> String {
+        if let Some(light) = key.checked_sub(self.keys(aov)) {
+            let name = self.scene.lights.get(light as usize).and_then(|light| light.name.clone());
+            return name.unwrap_or_else(|| format!("light {light}"));
+        }
         match aov {
             Aov::CryptoMaterial => self.scene.materials[key as usize].name.clone(),
             Aov::CryptoGroup => match key.checked_sub(1) {

@@ -2,6 +2,7 @@
 
 use super::sums::Places;
 use crate::lanes::{Float8, LANES, Mask8, bits, first_least, float8};
+use crate::plan::Kind;
 use crate::scene::{Aov, Layers};
 use crate::shapes::RowRef;
 
@@ -21,6 +22,17 @@ pub(in crate::render) struct Near {
 impl Near {
     /// Nothing, or no sample yet.
     pub const NONE: Near = Near { t: 0.0, row: RowRef::MISS, primitive: 0, material: 0, sample: 0 };
+
+    /// A light, which is no primitive; its material is a number of its own.
+    pub fn light(t: f32, material: u32, sample: u32) -> Self {
+        // A row of no store: any that is no miss will do.
+        Near { t, row: RowRef::new(Kind::Sphere, 0), primitive: u32::MAX, material, sample }
+    }
+
+    /// Whether it is a light.
+    pub fn is_light(&self) -> bool {
+        self.primitive == u32::MAX
+    }
 }
 
 /// What the samples nearest to the centres of a block's pixels saw, as far as layers need it: the rest is empty.

@@ -127,6 +127,18 @@ impl Sums {
         }
     }
 
+    /// Adds a light that a sample of a pixel saw, to the Cryptomattes and, where it is the nearest, to all that it tells.
+    pub fn add_light(&mut self, plan: &LayerPlan, pixel: usize, light: usize, nearest: Option<(Near, f32)>) {
+        for (tally, aov) in self.tallies.iter_mut().zip(Aov::CRYPTOMATTES) {
+            if let Some(tally) = tally {
+                tally.add(pixel, plan.light_key(aov, light));
+            }
+        }
+        if let Some((near, depth)) = nearest {
+            self.nearest.see(pixel, near, depth, plan.light_key(Aov::CryptoObject, light));
+        }
+    }
+
     /// All channels. `place` tells where the nearest sample of a pixel sees something.
     pub fn finish(mut self, plan: &LayerPlan, place: impl Fn(usize, &Near) -> Place) -> LayerWork {
         let mut work = LayerWork { channels: Vec::new(), seen: Default::default() };

@@ -5,8 +5,8 @@ use super::near::Near;
 use super::sums::{LayerWork, Place, Places, Sums};
 use crate::accel::PACKETS;
 use crate::film::Window;
-use crate::integrate::{RayKind, Record, Samples8, Seen, Silent, Spent, Summed, Taken};
-use crate::lanes::{LANES, Mask8, Ray, Vec3x8, bits};
+use crate::integrate::{Lit, RayKind, Record, Samples8, Seen, Silent, Spent, Summed, Taken};
+use crate::lanes::{Float8, LANES, Mask8, Ray, Vec3x8, bits};
 use crate::plan::Owner;
 use crate::reference;
 use crate::render::block::PACKET;
@@ -89,6 +89,11 @@ impl<'a, 's> LayerTape<'a, 's> {
         sums.finish(plan, |pixel, near| place(frame(near), block.pixel(pixel), near))
     }
 
+    #[inline(always)]
+    fn depth(&self, t: Float8, dir: Vec3x8) -> Float8 {
+        t * self.axis.map_or_else(|| dir.length(), |axis| dir.dot(Vec3x8::splat(axis)))
+    }
+
     fn add_radiance(&mut self, summed: &Summed) {
         for (p, pixels) in summed.pixels.iter().enumerate() {
             let radiance = summed.samples.radiance[p].to_arrays();
@@ -108,8 +113,7 @@ impl<'a, 's> LayerTape<'a, 's> {
     #[inline(always)]
     fn add_nearest(&mut self, packet: &Packet, nearest: u32, seen: &Seen) {
         let (t, dir) = (seen.rays.t_max, seen.rays.dir);
-        let share = self.axis.map_or_else(|| dir.length(), |axis| dir.dot(Vec3x8::splat(axis)));
-        let (depth, t, rows) = (t * share, t.to_array(), seen.rows.to_array());
+        let (depth, t, rows) = (self.depth(t, dir), t.to_array(), seen.rows.to_array());
         let near = |i: usize| Near {
             t: t[i],
             row: RowRef::from_lane(rows[i]),
@@ -187,6 +191,19 @@ impl Record for LayerTape<'_, '_> {
         }
     }
 
+    fn lamps(&mut self, lit: &Lit) {
+        let packet = self.tile[lit.packet];
+        let (t, dir) = (lit.rays.t_max, lit.rays.dir);
+        let (depth, t) = (self.depth(t, dir).to_array(), t.to_array());
+        for (i, light) in lit.lights.iter().enumerate().filter_map(|(i, light)| Some((i, (*light)?))) {
+            let near = || Near::light(t[i], self.plan.light_key(Aov::CryptoMaterial, light), packet.index[i]);
+            let nearest = (packet.nearest >> i & 1 == 1).then(|| (near(), depth[i]));
+            self.sums.add_light(self.plan, packet.pixels[i] as usize, light, nearest);
+        }
+        // What surfaces are told of later is not to set these pixels.
+        self.tile[lit.packet].below = None;
+    }
+
     fn summed(&mut self, summed: &Summed) {
         if self.sums.want_variance() {
             self.add_radiance(summed);
@@ -212,6 +229,9 @@ fn place(frame: &Frame, (x, y): (i32, i32), near: &Near) -> Place {
     samples.set(0, (x, y), frame.rays.pattern(x, y), near.sample);
     let (origin, dir) = frame.rays.exact(&samples).lane(0);
     let ray = Ray64 { origin, dir, t_min: 0.0, t_max: f64::INFINITY };
+    if near.is_light() {
+        return Place { point: origin + dir * f64::from(near.t) + frame.plan.origin, ..Place::NONE };
+    }
     let stores = frame.tree.stores();
     let found = stores.refine(near.row, &ray, f64::from(near.t));
     let point = found.map_or(origin + dir * f64::from(near.t), |found| found.point);
