@@ -34,7 +34,8 @@ pub fn files(scene: &Path, frame: i64) -> Vec<PathBuf> {
 
 /// Whether a scene file asks for what depends on the next frame too: motion, or a shutter that is open for some time.
 fn looks_ahead(path: &Path) -> bool {
-    let Some(text) = fs::read_to_string(path).ok().filter(|_| is_scene(path)) else { return false };
+    // Other files may be long, and this is asked once a frame.
+    let Some(text) = is_scene(path).then(|| fs::read_to_string(path).ok()).flatten() else { return false };
     let (root, _) = DeTable::parse_recoverable(&text);
     let value = |table: &str, key: &str| match root.get_ref().get(table)?.get_ref() {
         DeValue::Table(table) => table.get(key).map(|value| value.get_ref().clone()),
