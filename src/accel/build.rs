@@ -1,42 +1,19 @@
-//! Builds the tree: a binary one by PLOC with reinsertion, leaves whose parts one kind holds by the surface area
-//! heuristic, then eight children a node, and the parts in the order of their leaves.
+//! Builds the tree from the root: the largest of a node's parts is cut in two by the surface area heuristic until there
+//! are eight children, and the parts are put in the order of their leaves.
 
-use glam::{DVec3, Vec3, Vec3A};
-use obvhs::Boundable;
-use obvhs::aabb::Aabb;
-use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
-use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::Tree;
 use super::node::{Child, Content, Leaf, Node};
+use super::split::{Item, Span};
 use crate::lanes::LANES;
 use crate::plan::{Kind, Parts, Plan, Skip};
 use crate::scene::Visible;
 use crate::shapes::{Groups, Part, Stores};
 
-/// Most rows of a leaf.
-const MOST_ROWS: u32 = 8;
-/// Cost of a row in a leaf where that of a binary node, and of opening a leaf, is 1, for the surface area heuristic.
-/// Rows share a block and a kernel call, so eight of them cost a single ray what one does, and full leaves are what
-/// keeps a large scene in the caches; a packet tests them one by one.
-const ROW_COST: f32 = 0.1;
-/// The same for a sphere, which is the cheapest to test.
-const SPHERE_COST: f32 = 0.125;
-
-/// A part with bounds, and its bounds.
-struct Item {
-    kind: Kind,
-    index: u32,
-    aabb: Aabb,
-}
-
-impl Boundable for Item {
-    fn aabb(&self) -> Aabb {
-        self.aabb
-    }
-}
+/// Parts below a node from which on its children are built side by side.
+const SIDE_BY_SIDE: usize = 1 << 12;
 
 impl Tree {
     /// All that takes part in a plan.
@@ -60,25 +37,26 @@ impl Tree {
 
     /// The same without nodes: every ray is held against every part, which is faster where there are few.
     pub fn straight(parts: Parts, visible: &[Visible]) -> Self {
-        let loose_boxes = items(&parts).iter().map(|item| [item.aabb.min.into(), item.aabb.max.into()]).collect();
+        let corners = |item: &Item| item.bounds().corners().map(Vec3::from);
+        let loose_boxes = items(&parts).iter().map(corners).collect();
         Tree { loose_boxes, ..Tree::of(parts, visible, Vec::new()) }
     }
 
-    fn of(mut parts: Parts, visible: &[Visible], items: Vec<Item>) -> Self {
+    fn of(mut parts: Parts, visible: &[Visible], mut items: Vec<Item>) -> Self {
         let mut nodes = Vec::new();
         let counts =
             Kind::ALL.map(|kind| if items.is_empty() || kind == Kind::Plane { count(&parts, kind) } else { 0 });
         let (mut size, mut depth, mut groups) = (0.0, 0, None);
         if !items.is_empty() {
-            let binary = build_binary(&items);
-            let bounds = binary.nodes[0].aabb();
-            size = (bounds.max - bounds.min).max_element();
-            let mut wide = Widen::new(&binary, &items);
-            wide.build();
-            wide.nodes.shrink_to_fit();
-            (nodes, depth) = (wide.nodes, wide.depth);
-            parts = reorder(parts, &wide.order);
-            groups = Some(wide.groups);
+            let root = Span::new(&items, 0, items.len());
+            size = root.bounds.edges().into_iter().fold(0.0, f32::max);
+            let branch = Branch::new(&mut items, root);
+            (nodes, depth) = (branch.nodes, branch.depth);
+            nodes.shrink_to_fit();
+            let (order, sizes) = rows(&items, &branch.leaves);
+            drop(items);
+            parts = reorder(parts, &order);
+            groups = Some(sizes);
         }
         let stores = Stores::new(parts, groups.as_ref(), visible);
         let leaves = |(kind, count): (Kind, usize)| {
@@ -135,177 +113,126 @@ fn items(parts: &Parts) -> Vec<Item> {
 
 fn add<P: Part>(items: &mut Vec<Item>, origins: DVec3, kind: Kind, parts: &[P]) {
     let item = |(index, part): (usize, &P)| {
-        let (min, max) = part.bounds();
-        Item { kind, index: index as u32, aabb: outward(min, max, origins) }
+        let [low, high] = outward(part.bounds(), origins);
+        Item::new(kind, index, low, high)
     };
     items.par_extend(parts.par_iter().enumerate().map(item));
 }
 
 /// Bounds in f32 that hold the exact part and the rounded one, where rays that were rounded see them too: 4 roundings of
 /// the larger coordinate out, and of that of an origin.
-fn outward(min: DVec3, max: DVec3, origins: DVec3) -> Aabb {
+fn outward((min, max): (DVec3, DVec3), origins: DVec3) -> [[f32; 3]; 2] {
     let pad = (min.abs().max(max.abs()) + origins) * f64::from(2.0 * f32::EPSILON);
     let (min, max) = ((min - pad).as_vec3(), (max + pad).as_vec3());
-    let down = Vec3::new(min.x.next_down(), min.y.next_down(), min.z.next_down());
-    let up = Vec3::new(max.x.next_up(), max.y.next_up(), max.z.next_up());
-    Aabb::new(Vec3A::from(down), Vec3A::from(up))
+    [min.to_array().map(f32::next_down), max.to_array().map(f32::next_up)]
 }
 
-/// Sources: Meister and Bittner, "Parallel locally-ordered clustering for bounding volume hierarchy
-/// construction", IEEE TVCG 24(3), 2018, and "Parallel reinsertion for bounding volume hierarchy
-/// optimization", Computer Graphics Forum 37(2), 2018.
-fn build_binary(items: &[Item]) -> Bvh2 {
-    let indices = (0..items.len() as u32).collect();
-    let mut builder = PlocBuilder::with_capacity(items.len());
-    let mut binary = builder.build(PlocSearchDistance::Medium, items, indices, SortPrecision::U64, 3);
-    ReinsertionOptimizer::default().run(&mut binary, 0.05, None);
-    binary
+/// A node with all that is below it. Its nodes and blocks are counted from its own first ones.
+#[derive(Default)]
+struct Branch {
+    nodes: Vec<Node>,
+    /// Kinds and counts of the leaves, in the order of their items.
+    leaves: Vec<(Kind, u8)>,
+    /// By kind: how many leaves there are.
+    blocks: [usize; Kind::ALL.len()],
+    /// Levels of nodes.
+    depth: usize,
+}
+
+impl Branch {
+    /// All the items, which `span` takes in: they are in the order of their leaves when it is done.
+    fn new(items: &mut [Item], span: Span) -> Self {
+        let mut branch = Branch::default();
+        branch.depth = branch.grow(items, span);
+        branch
+    }
+
+    /// Adds a node and all below it; how many levels those are.
+    fn grow(&mut self, items: &mut [Item], span: Span) -> usize {
+        let (children, count) = open(items, span);
+        let children = &children[..count];
+        let own = self.nodes.len();
+        self.nodes.push(Node::empty());
+        let apart = if span.count > SIDE_BY_SIDE { side_by_side(items, children) } else { Vec::new() };
+        let (mut apart, mut deepest) = (apart.into_iter(), 0);
+        for (slot, child) in children.iter().enumerate() {
+            let content = match child.leaf {
+                Some(kind) => Child::leaf(self.add_leaf(kind, child.count)),
+                None => Child::node(self.nodes.len()),
+            };
+            let [low, high] = child.bounds.corners().map(Vec3::from);
+            self.nodes[own].set(slot, low, high, content);
+            if child.leaf.is_none() {
+                let depth = match apart.next() {
+                    Some(branch) => self.append(branch),
+                    None => self.grow(items, *child),
+                };
+                deepest = deepest.max(depth);
+            }
+        }
+        1 + deepest
+    }
+
+    fn add_leaf(&mut self, kind: Kind, count: usize) -> Leaf {
+        let block = self.blocks[kind as usize];
+        self.blocks[kind as usize] += 1;
+        self.leaves.push((kind, count as u8));
+        Leaf { kind, block, count }
+    }
+
+    /// Adds a branch that was built apart; how many levels it has.
+    fn append(&mut self, branch: Branch) -> usize {
+        let first = self.nodes.len();
+        self.nodes.extend(branch.nodes);
+        self.nodes[first..].iter_mut().for_each(|node| node.shift(first, &self.blocks));
+        self.leaves.extend(branch.leaves);
+        self.blocks.iter_mut().zip(branch.blocks).for_each(|(own, blocks)| *own += blocks);
+        branch.depth
+    }
+}
+
+/// The branches of those children that are no leaves.
+fn side_by_side(mut items: &mut [Item], children: &[Span]) -> Vec<Branch> {
+    let mut tasks = Vec::with_capacity(children.len());
+    // They follow each other, and the last of them comes first off the end.
+    for child in children.iter().rev() {
+        let (rest, own) = items.split_at_mut(child.first);
+        items = rest;
+        if child.leaf.is_none() {
+            tasks.push((&mut own[..child.count], child.at_start()));
+        }
+    }
+    tasks.into_par_iter().rev().map(|(items, span)| Branch::new(items, span)).collect()
+}
+
+/// Cuts the largest span again and again until there are eight, or as many as there can be, and puts them in the order of
+/// their items.
+fn open(items: &mut [Item], span: Span) -> ([Span; LANES], usize) {
+    let (mut open, mut areas, mut count) = ([span; LANES], [f32::INFINITY; LANES], 1);
+    while count < LANES {
+        let inner = (0..count).filter(|k| open[*k].leaf.is_none());
+        let Some(largest) = inner.max_by(|a, b| areas[*a].total_cmp(&areas[*b])) else { break };
+        [open[largest], open[count]] = open[largest].split(items);
+        (areas[largest], areas[count]) = (open[largest].bounds.half_area(), open[count].bounds.half_area());
+        count += 1;
+    }
+    open[..count].sort_unstable_by_key(|span| span.first);
+    (open, count)
 }
 
 /// A part among those of its kind.
 type Place = (Kind, u32);
 
-/// From the binary tree to the wide one.
-struct Widen<'a> {
-    binary: &'a Bvh2,
-    items: &'a [Item],
-    /// By binary node: items below it, or 0 where they are of several kinds or too many for a leaf.
-    leaf: Vec<u32>,
-    nodes: Vec<Node>,
-    /// By kind: parts in the order of their rows.
-    order: Vec<Vec<Place>>,
-    groups: Groups,
-    /// Levels of nodes.
-    depth: usize,
-}
-
-impl<'a> Widen<'a> {
-    fn new(binary: &'a Bvh2, items: &'a [Item]) -> Self {
-        let leaf = choose_leaves(binary, items);
-        Widen {
-            binary,
-            items,
-            leaf,
-            nodes: Vec::new(),
-            order: vec![Vec::new(); Kind::ALL.len()],
-            groups: Groups::default(),
-            depth: 0,
-        }
+/// By kind: the parts in the order of their rows, and how many of them each leaf has, from items in the order of leaves.
+fn rows(mut items: &[Item], leaves: &[(Kind, u8)]) -> ([Vec<Place>; Kind::ALL.len()], Groups) {
+    let (mut order, mut sizes) = (<[Vec<Place>; Kind::ALL.len()]>::default(), Groups::default());
+    for (kind, count) in leaves {
+        let (own, rest) = items.split_at(usize::from(*count));
+        order[*kind as usize].extend(own.iter().map(|item| (item.kind(), item.index())));
+        sizes[*kind as usize].push(*count);
+        items = rest;
     }
-
-    /// Fills the nodes level by level from the root.
-    fn build(&mut self) {
-        self.nodes.push(Node::empty());
-        let mut waiting: Vec<(usize, u32, usize)> = vec![(0, 0, 1)];
-        while let Some((wide, binary, depth)) = waiting.pop() {
-            self.depth = self.depth.max(depth);
-            let (open, count) = self.eight_below(binary);
-            for (slot, child) in open.into_iter().take(count).enumerate() {
-                let aabb = *self.binary.nodes[child as usize].aabb();
-                let content = if self.leaf[child as usize] > 0 {
-                    self.add_leaf(child)
-                } else {
-                    self.nodes.push(Node::empty());
-                    waiting.push((self.nodes.len() - 1, child, depth + 1));
-                    Child::node(self.nodes.len() - 1)
-                };
-                self.nodes[wide].set(slot, aabb.min.into(), aabb.max.into(), content);
-            }
-        }
-    }
-
-    /// Opens the largest node again and again until there are eight children, or as many as there can be.
-    fn eight_below(&self, root: u32) -> ([u32; LANES], usize) {
-        let area = |child: u32| match self.leaf[child as usize] {
-            0 => self.binary.nodes[child as usize].aabb().half_area(),
-            _ => f32::NEG_INFINITY,
-        };
-        let (mut open, mut areas, mut count) = ([root; LANES], [area(root); LANES], 1);
-        while count < LANES {
-            let largest = (0..count).max_by(|a, b| areas[*a].total_cmp(&areas[*b])).unwrap_or(0);
-            if self.leaf[open[largest] as usize] != 0 {
-                break;
-            }
-            let first = self.binary.nodes[open[largest] as usize].first_index;
-            (open[largest], open[count]) = (first, first + 1);
-            (areas[largest], areas[count]) = (area(first), area(first + 1));
-            count += 1;
-        }
-        (open, count)
-    }
-
-    /// A leaf takes the kind that holds all its parts.
-    fn add_leaf(&mut self, root: u32) -> Child {
-        let (mut below, mut places, mut kind) = (vec![root], Vec::with_capacity(LANES), None);
-        while let Some(index) = below.pop() {
-            let node = &self.binary.nodes[index as usize];
-            if node.prim_count == 0 {
-                below.extend([node.first_index, node.first_index + 1]);
-                continue;
-            }
-            let range = node.first_index as usize..(node.first_index + node.prim_count) as usize;
-            for item in &self.binary.primitive_indices[range] {
-                let Item { kind: own, index, .. } = self.items[*item as usize];
-                kind = kind.map_or(Some(own), |kind: Kind| kind.holding(own));
-                places.push((own, index));
-            }
-        }
-        let (kind, count) = (kind.expect("leaves hold parts that go together"), places.len());
-        self.order[kind as usize].extend(places);
-        let groups = &mut self.groups[kind as usize];
-        groups.push(count as u8);
-        Child::leaf(Leaf { kind, block: groups.len() - 1, count })
-    }
-}
-
-/// By binary node: how many rows a leaf there would have, or 0 where there is to be no leaf.
-fn choose_leaves(binary: &Bvh2, items: &[Item]) -> Vec<u32> {
-    let mut preorder = vec![0u32];
-    let mut next = 0;
-    while next < preorder.len() {
-        let node = &binary.nodes[preorder[next] as usize];
-        if node.prim_count == 0 {
-            preorder.extend([node.first_index, node.first_index + 1]);
-        }
-        next += 1;
-    }
-    let mut below = vec![Below::default(); binary.nodes.len()];
-    let mut leaf = vec![0; binary.nodes.len()];
-    for index in preorder.into_iter().rev().map(|index| index as usize) {
-        let node = &binary.nodes[index];
-        let area = node.aabb().half_area();
-        if node.prim_count > 0 {
-            let kind = Some(items[binary.primitive_indices[node.first_index as usize] as usize].kind);
-            below[index] = Below { count: node.prim_count, kind, cost: area * leaf_cost(kind, node.prim_count) };
-            leaf[index] = node.prim_count;
-            continue;
-        }
-        let children = node.first_index as usize;
-        let (a, b) = (below[children], below[children + 1]);
-        let split = a.cost + b.cost + area;
-        let kind = a.kind.zip(b.kind).and_then(|(a, b)| a.holding(b));
-        let count = a.count.saturating_add(b.count);
-        let whole = area * leaf_cost(kind, count);
-        let fits = kind.is_some() && count <= MOST_ROWS && whole <= split;
-        let kind = kind.filter(|_| fits);
-        below[index] = Below { count, kind, cost: if fits { whole } else { split } };
-        leaf[index] = if fits { count } else { 0 };
-    }
-    leaf
-}
-
-fn leaf_cost(kind: Option<Kind>, rows: u32) -> f32 {
-    let row = if kind == Some(Kind::Sphere) { SPHERE_COST } else { ROW_COST };
-    1.0 + row * rows as f32
-}
-
-/// What lies below a binary node.
-#[derive(Debug, Clone, Copy, Default)]
-struct Below {
-    count: u32,
-    /// The one kind of it, where it may be a leaf.
-    kind: Option<Kind>,
-    cost: f32,
+    (order, sizes)
 }
 
 fn reorder(parts: Parts, order: &[Vec<Place>]) -> Parts {

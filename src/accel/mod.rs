@@ -12,6 +12,7 @@ mod line;
 mod node;
 mod outline;
 mod regroup;
+mod split;
 mod stack;
 mod stream;
 #[cfg(test)]

@@ -97,6 +97,18 @@ impl Node {
         Child(self.columns[CHILDREN].as_array()[slot % LANES].to_bits())
     }
 
+    /// Counts its children from other first ones: nodes, and blocks by kind.
+    pub fn shift(&mut self, nodes: usize, blocks: &[usize; Kind::ALL.len()]) {
+        for lane in 0..LANES {
+            let moved = match self.child(lane).content() {
+                Content::Node(0) => continue, // nobody's child: an empty slot
+                Content::Node(index) => Child::node(index + nodes),
+                Content::Leaf(leaf) => Child::leaf(Leaf { block: leaf.block + blocks[leaf.kind as usize], ..leaf }),
+            };
+            self.columns[CHILDREN].as_mut_array()[lane] = f32::from_bits(moved.0);
+        }
+    }
+
     /// Asks for all of it to be brought near.
     #[inline(always)]
     pub fn fetch(&self) {
