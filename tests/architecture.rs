@@ -31,7 +31,20 @@ const GROUND: &str = "scene";
 /// Where a crate may be named.
 const CRATES: [(&str, &[&str]); 2] = [
     ("wide", &["lanes"]),
-    ("rayon", &["render", "batch", "accel/build", "shapes/store", "measure", "cli", "output", "scene/particles"]),
+    (
+        "rayon",
+        &[
+            "render",
+            "batch",
+            "accel/build",
+            "shapes/store",
+            "plan/parts",
+            "measure",
+            "cli",
+            "output",
+            "scene/particles",
+        ],
+    ),
 ];
 
 #[derive(Debug)]

@@ -2,9 +2,10 @@
 //! the plan's origin.
 
 use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 
 use super::split::convex_pieces;
-use crate::scene::{Cone, Cuboid, Cylinder, Disk, Plane, Polygon, Primitive, Scene, Shape, Sphere};
+use crate::scene::{CloudShapes, Cone, Cuboid, Cylinder, Disk, Plane, Polygon, Primitive, Scene, Shape, Sphere};
 
 /// The kinds of parts, each with a store and a kernel of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -259,9 +260,22 @@ impl Parts {
     /// Takes a scene apart, relative to `origin`; of `needed`, by primitive, only what is true.
     pub fn new(scene: &Scene, origin: DVec3, needed: Option<&[bool]>) -> Self {
         let mut parts = Parts::default();
-        for (index, primitive) in scene.primitives().enumerate() {
-            if needed.is_none_or(|needed| needed[index]) {
-                parts.add(&primitive, index as u32, origin);
+        let is_needed = |index: usize| needed.is_none_or(|needed| needed[index]);
+        for (index, object) in scene.objects.iter().enumerate().filter(|(index, _)| is_needed(*index)) {
+            parts.add(&object.primitive(), index as u32, origin);
+        }
+        for (first, cloud) in scene.clouds_from() {
+            if let (CloudShapes::Spheres(rows), None) = (&cloud.shapes, needed) {
+                let part = |row: usize| {
+                    let [x, y, z, radius] = rows.row(row);
+                    let owner = Owner { primitive: (first + row) as u32, material: cloud.material_of(row) as u32 };
+                    SpherePart { center: DVec3::new(x, y, z) - origin, radius, owner }
+                };
+                parts.spheres.par_extend((0..cloud.len()).into_par_iter().map(part));
+                continue;
+            }
+            for row in (0..cloud.len()).filter(|row| is_needed(first + row)) {
+                parts.add(&cloud.primitive(row), (first + row) as u32, origin);
             }
         }
         parts

@@ -95,11 +95,15 @@ impl Cloud {
 
     /// Row `i` as a primitive.
     pub fn primitive(&self, i: usize) -> Primitive<'_> {
-        let material = match &self.material {
+        Primitive { shape: Cow::Owned(self.shapes.shape(i)), material: self.material_of(i), color: self.color(i) }
+    }
+
+    /// Material of row `i`.
+    pub fn material_of(&self, i: usize) -> usize {
+        match &self.material {
             CloudMaterial::One(material) => *material,
             CloudMaterial::Each(materials) => materials[i] as usize,
-        };
-        Primitive { shape: Cow::Owned(self.shapes.shape(i)), material, color: self.color(i) }
+        }
     }
 
     /// Factor on the colour of row `i`'s material.

@@ -175,6 +175,15 @@ impl Scene {
         objects.chain(rows)
     }
 
+    /// The clouds, each with the index of its first primitive.
+    pub fn clouds_from(&self) -> impl Iterator<Item = (usize, &Cloud)> {
+        self.clouds.iter().scan(self.objects.len(), |next, cloud| {
+            let first = *next;
+            *next += cloud.len();
+            Some((first, cloud))
+        })
+    }
+
     /// The name of a primitive: the user's, the cloud's, or its kind and index ("sphere 17").
     pub fn primitive_name(&self, index: usize) -> Option<String> {
         let primitive = self.primitive(index)?;
@@ -242,7 +251,7 @@ impl Scene {
 }
 
 impl Object {
-    fn primitive(&self) -> Primitive<'_> {
+    pub(crate) fn primitive(&self) -> Primitive<'_> {
         Primitive { shape: Cow::Borrowed(&self.shape), material: self.material, color: DVec3::ONE }
     }
 }
