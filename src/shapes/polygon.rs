@@ -18,6 +18,31 @@ pub struct Anchor {
     slip: Float8,   // of places beside the center, the error of t apart
 }
 
+/// A place that f32 holds, beside `place` and as near the plane through it as there is one: what a corner of f32 loses to
+/// rounding moves no plane.
+fn held(place: DVec3, normal: DVec3) -> DVec3 {
+    /// Steps of f32 on an axis at most, so that it stays beside the place.
+    const MOST_STEPS: f64 = 8.0;
+    let rounded = place.as_vec3().as_dvec3();
+    let off = |from: DVec3| normal.dot(place - from);
+    let step = |axis: usize| {
+        let x = (place[axis] as f32).abs();
+        f64::from(x.next_up() - x)
+    };
+    // The axis on which a step goes furthest along the normal first; those after it fill in what it leaves.
+    let mut axes = [0, 1, 2];
+    axes.sort_unstable_by(|a, b| (step(*b) * normal[*b].abs()).total_cmp(&(step(*a) * normal[*a].abs())));
+    let mut held = rounded;
+    for axis in axes {
+        let steps = (off(held) / (step(axis) * normal[axis])).round();
+        if steps.abs() <= MOST_STEPS {
+            held[axis] += steps * step(axis);
+        }
+    }
+    let held = held.as_vec3().as_dvec3(); // which rounds where a step went past a power of two
+    if off(held).abs() < off(rounded).abs() { held } else { rounded }
+}
+
 impl<const N: usize> Part for PolygonPart<N> {
     /// A center in the plane and the unit normal; the radius about the center, how far corners lie beside the plane, and
     /// the axis that edges are seen along (0, 1, 2); by edge the unit vector across it, inward, on the other two axes,
@@ -32,7 +57,7 @@ impl<const N: usize> Part for PolygonPart<N> {
         let warp = greatest(&|corner| normal.dot(corner - first).abs());
         let (low, high) = self.bounds();
         let middle = low.midpoint(high);
-        let center = middle + normal * normal.dot(first - middle);
+        let center = held(middle + normal * normal.dot(first - middle), normal);
         let radius = greatest(&|corner| corner.distance(center));
         let axis = normal.abs().max_position();
         let seen = |corner: DVec3| match axis {
@@ -156,5 +181,31 @@ impl<const N: usize> Part for PolygonPart<N> {
 
     fn owner(&self) -> Owner {
         self.owner
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_plane_of_a_polygon_stays_where_it_is() {
+        let (mut plain, mut kept, mut count) = (0.0, 0.0, 0.0);
+        for k in 0..1000 {
+            let turn = |rate: f64| (f64::from(k) * rate).sin();
+            let normal = DVec3::new(turn(1.1), turn(2.3), turn(3.7)).normalize();
+            let place = DVec3::new(11.0 * turn(0.7), 0.3 * turn(5.3), 90.0 * turn(7.9));
+            let off = |from: DVec3| normal.dot(place - from).abs();
+            let (held, rounded) = (held(place, normal), place.as_vec3().as_dvec3());
+            assert_eq!(held, held.as_vec3().as_dvec3());
+            assert!(off(held) <= off(rounded));
+            // Eight steps of f32 on each axis, each at most a rounding of the place twice.
+            assert!((held - place).abs().max_element() <= 9.0 * f64::from(f32::EPSILON) * 90.0);
+            (plain, kept, count) = (plain + off(rounded), kept + off(held), count + 1.0);
+        }
+        assert!(kept < 0.1 * plain, "{} beside {} a place", kept / count, plain / count);
+        let (place, up) = (DVec3::new(0.1, 3.0, 0.7), DVec3::Y);
+        assert_eq!(held(place, up), place.as_vec3().as_dvec3());
+        assert_eq!(held(DVec3::ZERO, up), DVec3::ZERO);
     }
 }
