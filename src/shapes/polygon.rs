@@ -191,7 +191,7 @@ mod tests {
     #[test]
     fn the_plane_of_a_polygon_stays_where_it_is() {
         let (mut plain, mut kept, mut count) = (0.0, 0.0, 0.0);
-        for k in 0..1000 {
+        for k in 1..=1000 {
             let turn = |rate: f64| (f64::from(k) * rate).sin();
             let normal = DVec3::new(turn(1.1), turn(2.3), turn(3.7)).normalize();
             let place = DVec3::new(11.0 * turn(0.7), 0.3 * turn(5.3), 90.0 * turn(7.9));
