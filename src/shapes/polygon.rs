@@ -21,8 +21,8 @@ pub struct Anchor {
 /// A place that f32 holds, beside `place` and as near the plane through it as there is one: what a corner of f32 loses to
 /// rounding moves no plane.
 fn held(place: DVec3, normal: DVec3) -> DVec3 {
-    /// Steps of f32 on an axis at most, so that it stays beside the place.
-    const MOST_STEPS: f64 = 8.0;
+    /// How far it may be from the place on an axis, in steps of f32 of the largest coordinate.
+    const REACH: f64 = 2.0;
     let rounded = place.as_vec3().as_dvec3();
     let off = |from: DVec3| normal.dot(place - from);
     let step = |axis: usize| {
@@ -32,11 +32,12 @@ fn held(place: DVec3, normal: DVec3) -> DVec3 {
     // The axis on which a step goes furthest along the normal first; those after it fill in what it leaves.
     let mut axes = [0, 1, 2];
     axes.sort_unstable_by(|a, b| (step(*b) * normal[*b].abs()).total_cmp(&(step(*a) * normal[*a].abs())));
+    let reach = REACH * step(place.abs().max_position());
     let mut held = rounded;
     for axis in axes {
-        let steps = (off(held) / (step(axis) * normal[axis])).round();
-        if steps.abs() <= MOST_STEPS {
-            held[axis] += steps * step(axis);
+        let way = (off(held) / (step(axis) * normal[axis])).round() * step(axis);
+        if way.abs() <= reach {
+            held[axis] += way;
         }
     }
     let held = held.as_vec3().as_dvec3(); // which rounds where a step went past a power of two
@@ -199,8 +200,9 @@ mod tests {
             let (held, rounded) = (held(place, normal), place.as_vec3().as_dvec3());
             assert_eq!(held, held.as_vec3().as_dvec3());
             assert!(off(held) <= off(rounded));
-            // Eight steps of f32 on each axis, each at most a rounding of the place twice.
-            assert!((held - place).abs().max_element() <= 9.0 * f64::from(f32::EPSILON) * 90.0);
+            // A step of f32 is at most so large a part of the largest coordinate, and rounding takes half of one.
+            let reach = 2.5 * f64::from(f32::EPSILON) * place.abs().max_element();
+            assert!((held - place).abs().max_element() <= reach);
             (plain, kept, count) = (plain + off(rounded), kept + off(held), count + 1.0);
         }
         assert!(kept < 0.1 * plain, "{} beside {} a place", kept / count, plain / count);
