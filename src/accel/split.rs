@@ -4,7 +4,7 @@ use crate::lanes::{Float8, LANES, float8};
 use crate::plan::Kind;
 
 /// Most rows of a leaf.
-pub const MOST_ROWS: usize = LANES;
+const MOST_ROWS: usize = LANES;
 /// Cost of a row in a leaf where that of a binary node, and of opening a leaf, is 1, for the surface area heuristic.
 /// Rows share a block and a kernel call, so eight of them cost a single ray what one does, and full leaves are what
 /// keeps a large scene in the caches; a packet tests them one by one.
