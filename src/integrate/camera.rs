@@ -91,11 +91,11 @@ impl CameraRays {
     /// Eight rays in f64.
     pub fn exact(&self, samples: &Samples8) -> ExactPacket {
         let mut rays = ExactPacket::default();
-        self.set_exact(samples, &self.points(samples), &mut rays);
+        self.set_exact(samples, &samples.points(&self.offsets(samples)), &mut rays);
         rays
     }
 
-    /// Sets eight rays in f64, through the [points](CameraRays::points) of their samples.
+    /// Sets eight rays in f64, through the [points](Samples8::points) of their samples.
     #[inline(always)]
     pub fn set_exact(&self, samples: &Samples8, points: &[[f64; LANES]; 2], rays: &mut ExactPacket) {
         for k in 0..3 {
@@ -120,22 +120,12 @@ impl CameraRays {
         RayPacket::new(origin, rounded(&exact.dir), float8(f32::INFINITY), live)
     }
 
-    /// Points of the picture in pixels: x, y.
+    /// How far samples are from the centres of their pixels, in pixels: right, down.
     #[inline(always)]
-    pub fn points(&self, samples: &Samples8) -> [[f64; LANES]; 2] {
-        let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
-        for lane in 0..LANES {
-            x[lane] = f64::from(samples.x[lane]) + 0.5;
-            y[lane] = f64::from(samples.y[lane]) + 0.5;
-        }
-        let Some(filter) = &self.filter else { return [x, y] };
-        let [u, v] = samples.pattern.sample(&samples.index);
-        let off = [filter.offsets(&u), filter.offsets(&v)];
-        for lane in 0..LANES {
-            x[lane] += off[0][lane];
-            y[lane] += off[1][lane];
-        }
-        [x, y]
+    pub fn offsets(&self, samples: &Samples8) -> [[f64; LANES]; 2] {
+        let Some(filter) = &self.filter else { return [[0.0; LANES]; 2] };
+        let [right, down] = samples.pattern.sample(&samples.index);
+        [filter.offsets(&right), filter.offsets(&down)]
     }
 }
 
@@ -173,14 +163,15 @@ pub struct Samples8 {
 }
 
 impl Samples8 {
-    /// Squares of the distances of points of the picture from the centres of their pixels.
+    /// Points of the picture in pixels: x, y.
     #[inline(always)]
-    pub fn distances(&self, points: &[[f64; LANES]; 2]) -> [f64; LANES] {
-        let off = |axis: &[f64; LANES], pixels: &[i32; LANES], i: usize| axis[i] - (f64::from(pixels[i]) + 0.5);
-        std::array::from_fn(|i| {
-            let (dx, dy) = (off(&points[0], &self.x, i), off(&points[1], &self.y, i));
-            dx * dx + dy * dy
-        })
+    pub fn points(&self, offsets: &[[f64; LANES]; 2]) -> [[f64; LANES]; 2] {
+        let [mut x, mut y] = *offsets;
+        for lane in 0..LANES {
+            x[lane] += f64::from(self.x[lane]) + 0.5;
+            y[lane] += f64::from(self.y[lane]) + 0.5;
+        }
+        [x, y]
     }
 
     /// Sets one sample: its pixel, that one's pattern, and its index.

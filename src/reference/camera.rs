@@ -47,22 +47,24 @@ impl Reference {
 }
 
 impl View {
+    /// How far a sample is from the centre of its pixel, in pixels: right, down.
+    fn offset(&self, x: i32, y: i32, sample: u32) -> DVec2 {
+        if self.spp == 1 {
+            return DVec2::ZERO;
+        }
+        let pair = sample::pair(self.key(x, y), sample, sample::dimension::FILTER);
+        DVec2::from_array(pair.map(|fraction| self.filter.offset(fraction)))
+    }
+
     /// The point of the picture, in pixels, that a sample of a pixel looks through.
     pub fn point(&self, x: i32, y: i32, sample: u32) -> (f64, f64) {
-        let (center_x, center_y) = (f64::from(x) + 0.5, f64::from(y) + 0.5);
-        if self.spp == 1 {
-            return (center_x, center_y);
-        }
-        let key = self.key(x, y);
-        let [a, b] = sample::pair(key, sample, sample::dimension::FILTER);
-        (center_x + self.filter.offset(a), center_y + self.filter.offset(b))
+        let center = DVec2::new(f64::from(x), f64::from(y)) + 0.5;
+        (center + self.offset(x, y, sample)).into()
     }
 
     /// The square of the distance between the point of a sample and the centre of its pixel, in pixels.
     pub fn distance(&self, x: i32, y: i32, sample: u32) -> f64 {
-        let (px, py) = self.point(x, y, sample);
-        let (dx, dy) = (px - (f64::from(x) + 0.5), py - (f64::from(y) + 0.5));
-        dx * dx + dy * dy
+        self.offset(x, y, sample).length_squared()
     }
 
     /// How far a length of a direction leads along the view axis; in a panorama, away from the eye.

@@ -410,13 +410,14 @@ impl Batch {
         let all = self.count;
         let count = |p: usize| all.saturating_sub(p * LANES).min(LANES);
         for (p, samples) in self.samples.iter().enumerate() {
-            let points = rays.points(samples);
+            let offsets = rays.offsets(samples);
             // Others are the centres themselves.
             if R::SURFACES && rays.spreads() {
-                self.distances[p] = samples.distances(&points);
+                let [right, down] = &offsets;
+                self.distances[p] = std::array::from_fn(|i| right[i] * right[i] + down[i] * down[i]);
             }
             let exact = &mut wave.tile.exact_mut()[p];
-            rays.set_exact(samples, &points, exact);
+            rays.set_exact(samples, &samples.points(&offsets), exact);
             if keep_exact {
                 wave.exact[p] = *exact;
             }

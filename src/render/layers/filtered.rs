@@ -8,9 +8,6 @@ use crate::lanes::{Float8, LANES, Vec3x8};
 use crate::scene::{Aov, Layers};
 
 /// Means of the normals and albedos of each pixel. Samples are drawn from the filter, so all weigh the same.
-///
-/// The sums of a pixel are a row of eight numbers: x, y, z, red, green, blue, and two to spare. So a packet is turned into
-/// rows once, and each of them is added at one go.
 #[derive(Debug, Default)]
 pub(in crate::render) enum Filtered {
     /// No layer needs them.
@@ -18,8 +15,33 @@ pub(in crate::render) enum Filtered {
     Unasked,
     /// Of a single sample: x, y, z, red, green, blue of all pixels.
     Single([Vec<f32>; 6]),
-    /// Of several: their sums.
-    Sums(Vec<[f64; LANES]>),
+    /// Of several: their sums, x, y, z, red, green, blue, and two to spare, so that a packet is turned into rows once and
+    /// each of them added at one go; and what is to be added yet.
+    Sums(Vec<[f64; LANES]>, Open),
+}
+
+/// Sums of some packets of one pixel, a lane each.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::render) struct Open {
+    pixel: u32,
+    packets: usize,
+    /// x, y, z, red, green, blue.
+    sums: [Float8; 6],
+}
+
+impl Open {
+    const NONE: Open = Open { pixel: u32::MAX, packets: 0, sums: [Float8::ZERO; 6] };
+    /// So few that f32 does to sum them up.
+    const MOST: usize = 8;
+
+    /// Adds what there is to its pixel, in an order that is always the same for these samples.
+    #[inline(always)]
+    fn close(&mut self, rows: &mut [[f64; LANES]]) {
+        let Some(row) = rows.get_mut(self.pixel as usize) else { return };
+        let lanes = lanes(&self.sums);
+        let four: [Float8; 4] = std::array::from_fn(|i| lanes[i] + lanes[i + 4]);
+        add(row, (four[0] + four[2]) + (four[1] + four[3]));
+    }
 }
 
 impl Filtered {
@@ -28,7 +50,7 @@ impl Filtered {
         match (layers.has_any(&[Aov::Normal, Aov::Albedo]), spp) {
             (false, _) => Filtered::Unasked,
             (true, Some(1)) => Filtered::Single([(); 6].map(|()| vec![0.0; pixels])),
-            (true, _) => Filtered::Sums(vec![[0.0; LANES]; pixels]),
+            (true, _) => Filtered::Sums(vec![[0.0; LANES]; pixels], Open::NONE),
         }
     }
 
@@ -39,27 +61,24 @@ impl Filtered {
     /// Adds a packet to its pixels; lanes that do not count have 0.
     #[inline(always)]
     pub fn add8(&mut self, normal: &Vec3x8, albedo: &Vec3x8, places: &Places) {
-        let zero = Float8::ZERO;
-        if let Filtered::Single(columns) = self {
-            let values = [normal.x, normal.y, normal.z, albedo.x, albedo.y, albedo.z];
-            // A sum, so that there is no zero below zero.
-            let values = values.map(|value| (value + zero).to_array());
-            columns.iter_mut().zip(&values).for_each(|(column, values)| places.set(column, values));
-            return;
-        }
-        let rows = [normal.x, normal.y, normal.z, albedo.x, albedo.y, albedo.z, zero, zero];
-        let rows = Float8::transpose(rows);
+        let values = [normal.x, normal.y, normal.z, albedo.x, albedo.y, albedo.z];
         match self {
-            Filtered::Unasked | Filtered::Single(_) => {}
-            // In an order that is always the same for these samples.
-            Filtered::Sums(sums) if places.whole => {
-                let four: [Float8; 4] = std::array::from_fn(|i| rows[i] + rows[i + 4]);
-                add(&mut sums[places.pixels[0] as usize], (four[0] + four[2]) + (four[1] + four[3]));
+            Filtered::Unasked => {}
+            Filtered::Single(columns) => {
+                // A sum, so that there is no zero below zero.
+                let values = values.map(|value| (value + Float8::ZERO).to_array());
+                columns.iter_mut().zip(&values).for_each(|(column, values)| places.set(column, values));
             }
-            // In the order of the lanes, so that it does not matter how samples are spread over packets.
-            Filtered::Sums(sums) => {
-                places.pixels.iter().zip(rows).for_each(|(pixel, row)| add(&mut sums[*pixel as usize], row));
+            Filtered::Sums(rows, open) if places.whole => {
+                if open.pixel != places.pixels[0] || open.packets == Open::MOST {
+                    open.close(rows);
+                    *open = Open { pixel: places.pixels[0], packets: 1, sums: values };
+                } else {
+                    open.packets += 1;
+                    (0..6).for_each(|k| open.sums[k] += values[k]);
+                }
             }
+            Filtered::Sums(rows, _) => add_lanes(rows, places.pixels, &values),
         }
     }
 
@@ -71,7 +90,7 @@ impl Filtered {
             Filtered::Single(columns) => {
                 columns.iter_mut().zip(values).for_each(|(column, value)| column[pixel] += value as f32);
             }
-            Filtered::Sums(rows) => rows[pixel].iter_mut().zip(values).for_each(|(own, value)| *own += value),
+            Filtered::Sums(rows, _) => rows[pixel].iter_mut().zip(values).for_each(|(own, value)| *own += value),
         }
     }
 
@@ -80,14 +99,29 @@ impl Filtered {
         let columns = match self {
             Filtered::Unasked => Default::default(),
             Filtered::Single(columns) => columns,
-            Filtered::Sums(sums) => columns(sums.len(), |pixel| {
-                let share = 1.0 / f64::from(samples(pixel));
-                Float8::new(sums[pixel].map(|sum| (sum * share) as f32))
-            }),
+            Filtered::Sums(mut rows, mut open) => {
+                open.close(&mut rows);
+                columns(rows.len(), |pixel| {
+                    let share = 1.0 / f64::from(samples(pixel));
+                    Float8::new(rows[pixel].map(|sum| (sum * share) as f32))
+                })
+            }
         };
         let [x, y, z, red, green, blue] = columns.map(|column| Samples::halves(&column));
         [[x, y, z], [red, green, blue]]
     }
+}
+
+/// Adds a packet lane by lane, so that it does not matter how samples are spread over packets.
+#[inline(never)]
+fn add_lanes(rows: &mut [[f64; LANES]], pixels: &[u32; LANES], values: &[Float8; 6]) {
+    pixels.iter().zip(lanes(values)).for_each(|(pixel, lane)| add(&mut rows[*pixel as usize], lane));
+}
+
+/// What each lane adds to the row of its pixel.
+#[inline(always)]
+fn lanes(&[x, y, z, red, green, blue]: &[Float8; 6]) -> [Float8; LANES] {
+    Float8::transpose([x, y, z, red, green, blue, Float8::ZERO, Float8::ZERO])
 }
 
 #[inline(always)]

@@ -1,7 +1,7 @@
 //! What a pixel keeps: the sample nearest to its centre, and batches of samples for the variance of its mean.
 
 use super::sums::Places;
-use crate::lanes::{Float8, LANES, Mask8, bits, first_least, float8};
+use crate::lanes::{Float8, LANES, Mask8, bits, float8};
 use crate::plan::Kind;
 use crate::scene::{Aov, Layers};
 use crate::shapes::RowRef;
@@ -67,15 +67,17 @@ impl Nearest {
         }
     }
 
+    /// Whether samples are to be chosen among several of their pixels.
+    pub fn chooses(&self) -> bool {
+        !self.distances.is_empty()
+    }
+
     /// Of some samples of a packet, counted from lane 0, those that are the nearest of their pixels so far, the first of
-    /// equals; `one` says that all lanes are of one pixel. Until more is said of them they see nothing.
+    /// equals. Until more is said of them they see nothing.
     #[inline]
-    pub fn choose(&mut self, (pixels, one): (&[u32; LANES], bool), distances: &[f64; LANES], count: usize) -> u32 {
-        if self.distances.is_empty() {
+    pub fn choose(&mut self, pixels: &[u32; LANES], distances: &[f64; LANES], count: usize) -> u32 {
+        if !self.chooses() {
             return if self.is_asked { (1 << count) - 1 } else { 0 };
-        }
-        if one && count == LANES {
-            return self.choose_if(pixels[0] as usize, first_least(distances));
         }
         let (mut chosen, mut i) = (0, 0);
         while i < count {
@@ -88,9 +90,9 @@ impl Nearest {
         chosen
     }
 
-    /// The lane of a sample, where it is the nearest one so far.
-    #[inline]
-    fn choose_if(&mut self, pixel: usize, (lane, distance): (usize, f64)) -> u32 {
+    /// The same for samples of one pixel, of which this lane is the first of the nearest.
+    #[inline(always)]
+    pub fn choose_if(&mut self, pixel: usize, (lane, distance): (usize, f64)) -> u32 {
         let so_far = std::mem::replace(&mut self.distances[pixel], distance);
         if distance < so_far {
             if so_far < f64::INFINITY {

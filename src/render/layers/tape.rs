@@ -1,12 +1,12 @@
 //! From the engine's tiles to the layers of a block.
 
 use super::LayerPlan;
-use super::near::Near;
+use super::near::{Near, Nearest};
 use super::sums::{LayerWork, Place, Places, Sums};
 use crate::accel::PACKETS;
 use crate::film::Window;
 use crate::integrate::{Lit, RayKind, Record, Samples8, Seen, Silent, Spent, Summed, Taken};
-use crate::lanes::{Float8, LANES, Mask8, Ray, Vec3x8, bits};
+use crate::lanes::{Float8, LANES, Mask8, Ray, Vec3x8, bits, first_least};
 use crate::plan::Owner;
 use crate::reference;
 use crate::render::block::PACKET;
@@ -23,7 +23,7 @@ pub(in crate::render) struct LayerTape<'a, 's> {
     /// What depth is counted along; `None`: along each ray.
     axis: Option<[f32; 3]>,
     sums: Sums,
-    /// Whether packets of one pixel hold the same samples in any block.
+    /// Whether all packets are of one pixel each, and hold the same samples in any block.
     whole: bool,
     /// Where each pixel has a single sample, the places of a packet's 4 x 2 pixels, counted from the first.
     places: Option<[u32; LANES]>,
@@ -37,20 +37,18 @@ struct Packet {
     index: [u32; LANES],
     /// Lanes that are the nearest to the centres of their pixels.
     nearest: u32,
-    /// Whether all lanes are of one pixel.
-    one: bool,
     /// Where all lanes are the only samples of 4 x 2 pixels, the place of those below the first.
     below: Option<usize>,
 }
 
 impl Packet {
     fn lanes_of(&self, pixel: u32) -> u32 {
-        if self.one {
-            return if self.pixels[0] == pixel { (1 << LANES) - 1 } else { 0 };
-        }
         (0..LANES).fold(0, |lanes, i| lanes | u32::from(self.pixels[i] == pixel) << i)
     }
 }
+
+/// All lanes of a packet.
+const ALL: u32 = (1 << LANES) - 1;
 
 /// A sample of a later packet is nearer to the centre of a pixel than those of the packets before.
 fn forget(packets: &mut [Packet], pixel: u32) {
@@ -89,9 +87,28 @@ impl<'a, 's> LayerTape<'a, 's> {
         sums.finish(plan, |pixel, near| place(frame(near), block.pixel(pixel), near))
     }
 
-    #[inline(always)]
-    fn depth(&self, t: Float8, dir: Vec3x8) -> Float8 {
-        t * self.axis.map_or_else(|| dir.length(), |axis| dir.dot(Vec3x8::splat(axis)))
+    /// The samples of a tile whose packets are of one pixel each: those of a pixel follow each other.
+    fn take_whole(&mut self, taken: &Taken) {
+        let (nearest, tile) = (self.sums.nearest(), &mut self.tile);
+        let packets = taken.count / LANES;
+        for (p, packet) in tile.iter_mut().enumerate().take(packets) {
+            let (pixels, index) = (taken.pixels[p], taken.samples[p].index);
+            *packet = Packet { pixels, index, nearest: 0, below: None };
+        }
+        let mut p = 0;
+        while nearest.chooses() && p < packets {
+            let (pixel, mut best) = (tile[p].pixels[0], p);
+            let (mut lane, mut distance) = first_least(&taken.distances[p]);
+            p += 1;
+            while p < packets && tile[p].pixels[0] == pixel {
+                let next = first_least(&taken.distances[p]);
+                if next.1 < distance {
+                    (best, (lane, distance)) = (p, next);
+                }
+                p += 1;
+            }
+            tile[best].nearest = nearest.choose_if(pixel as usize, (lane, distance));
+        }
     }
 
     fn add_radiance(&mut self, summed: &Summed) {
@@ -102,35 +119,40 @@ impl<'a, 's> LayerTape<'a, 's> {
             }
         }
     }
+}
 
-    fn add_to_mattes(&mut self, packet: &Packet, seen: &Seen) {
-        for i in bits(seen.hit) {
-            let (pixel, owner) = (packet.pixels[i] as usize, seen.owners[i]);
-            self.sums.add_to_mattes(self.plan, pixel, owner.primitive, seen.materials[i]);
-        }
+/// How far hits are along the view axis, or along their rays.
+#[inline(always)]
+fn depth(axis: Option<[f32; 3]>, t: Float8, dir: Vec3x8) -> Float8 {
+    t * axis.map_or_else(|| dir.length(), |axis| dir.dot(Vec3x8::splat(axis)))
+}
+
+/// Adds what those of a packet's samples see that are the nearest of their pixels.
+#[inline(always)]
+fn add_nearest(plan: &LayerPlan, all: &mut Nearest, packet: &Packet, (nearest, depth): (u32, Float8), seen: &Seen) {
+    let (t, rows, objects) = (seen.rays.t_max.to_array(), seen.rows.to_array(), &plan.objects);
+    let near = |i: usize| Near {
+        t: t[i],
+        row: RowRef::from_lane(rows[i]),
+        primitive: seen.owners[i].primitive,
+        material: seen.materials[i],
+        sample: packet.index[i],
+    };
+    if nearest.is_power_of_two() {
+        let i = nearest.trailing_zeros() as usize;
+        all.see(packet.pixels[i] as usize, near(i), depth.to_array()[i], objects.of(seen.owners[i].primitive));
+    } else {
+        let places = Places { pixels: &packet.pixels, lanes: nearest, whole: false, below: packet.below };
+        let mut primitives = [0; LANES];
+        (0..LANES).for_each(|i| primitives[i] = seen.owners[i].primitive);
+        all.see8(&places, depth, [objects.of_all(primitives), *seen.materials], near);
     }
+}
 
-    #[inline(always)]
-    fn add_nearest(&mut self, packet: &Packet, nearest: u32, seen: &Seen) {
-        let (t, dir) = (seen.rays.t_max, seen.rays.dir);
-        let (depth, t, rows) = (self.depth(t, dir), t.to_array(), seen.rows.to_array());
-        let near = |i: usize| Near {
-            t: t[i],
-            row: RowRef::from_lane(rows[i]),
-            primitive: seen.owners[i].primitive,
-            material: seen.materials[i],
-            sample: packet.index[i],
-        };
-        let (objects, all) = (&self.plan.objects, self.sums.nearest());
-        if nearest.is_power_of_two() {
-            let i = nearest.trailing_zeros() as usize;
-            all.see(packet.pixels[i] as usize, near(i), depth.to_array()[i], objects.of(seen.owners[i].primitive));
-        } else {
-            let places = Places { pixels: &packet.pixels, lanes: nearest, whole: false, below: packet.below };
-            let mut primitives = [0; LANES];
-            (0..LANES).for_each(|i| primitives[i] = seen.owners[i].primitive);
-            all.see8(&places, depth, [objects.of_all(primitives), *seen.materials], near);
-        }
+#[inline(never)]
+fn add_to_mattes(plan: &LayerPlan, sums: &mut Sums, packet: &Packet, seen: &Seen) {
+    for i in bits(seen.hit) {
+        sums.add_to_mattes(plan, packet.pixels[i] as usize, seen.owners[i].primitive, seen.materials[i]);
     }
 }
 
@@ -155,17 +177,19 @@ impl Record for LayerTape<'_, '_> {
     }
 
     fn taken(&mut self, taken: &Taken) {
+        if self.whole {
+            return self.take_whole(taken);
+        }
         let packets = taken.samples.iter().zip(taken.pixels).zip(taken.distances);
         for (p, ((samples, pixels), distances)) in packets.enumerate() {
             let count = LANES.min(taken.count - p * LANES);
-            let one = *pixels == [pixels[0]; LANES];
-            let nearest = self.sums.nearest().choose((pixels, one), distances, count);
+            let nearest = self.sums.nearest().choose(pixels, distances, count);
             let (before, rest) = self.tile.split_at_mut(p);
             let below = self
                 .places
                 .filter(|places| count == LANES && pixels.map(|pixel| pixel.wrapping_sub(pixels[0])) == *places);
             let below = below.map(|places| (pixels[0] + places[2]) as usize);
-            rest[0] = Packet { pixels: *pixels, index: samples.index, nearest, one, below };
+            rest[0] = Packet { pixels: *pixels, index: samples.index, nearest, below };
             let goes_on = before.last().is_some_and(|packet| packet.pixels[LANES - 1] == pixels[0]);
             if goes_on && nearest & rest[0].lanes_of(pixels[0]) != 0 {
                 forget(before, pixels[0]);
@@ -173,28 +197,33 @@ impl Record for LayerTape<'_, '_> {
         }
     }
 
+    #[inline(always)]
     fn surface(&mut self, seen: &Seen) {
-        let packet = &{ self.tile[seen.packet] };
-        let hit = Mask8::from_bits(seen.hit);
-        let Packet { one, below, .. } = *packet;
-        let places = Places { pixels: &packet.pixels, lanes: seen.hit, whole: self.whole && one, below };
-        if self.sums.filtered.is_asked() {
-            let met = |value: Vec3x8| Vec3x8::select(hit, value, Vec3x8::ZERO);
-            self.sums.filtered.add8(&met(seen.normal), &met(seen.bsdf.reflectance()), &places);
+        let LayerTape { tile, sums, plan, axis, whole, .. } = self;
+        let packet = &tile[seen.packet];
+        let places = Places { pixels: &packet.pixels, lanes: seen.hit, whole: *whole, below: packet.below };
+        if sums.filtered.is_asked() {
+            let (mut normal, mut albedo) = (seen.normal, seen.bsdf.reflectance());
+            if seen.hit != ALL {
+                let hit = Mask8::from_bits(seen.hit);
+                [normal, albedo] = [normal, albedo].map(|value| Vec3x8::select(hit, value, Vec3x8::ZERO));
+            }
+            sums.filtered.add8(&normal, &albedo, &places);
         }
         let nearest = packet.nearest & seen.hit;
         if nearest != 0 {
-            self.add_nearest(packet, nearest, seen);
+            let depth = depth(*axis, seen.rays.t_max, seen.rays.dir);
+            add_nearest(plan, sums.nearest(), packet, (nearest, depth), seen);
         }
-        if self.sums.want_mattes() {
-            self.add_to_mattes(packet, seen);
+        if sums.want_mattes() {
+            add_to_mattes(plan, sums, packet, seen);
         }
     }
 
     fn lamps(&mut self, lit: &Lit) {
         let packet = self.tile[lit.packet];
         let (t, dir) = (lit.rays.t_max, lit.rays.dir);
-        let (depth, t) = (self.depth(t, dir).to_array(), t.to_array());
+        let (depth, t) = (depth(self.axis, t, dir).to_array(), t.to_array());
         for (i, light) in lit.lights.iter().enumerate().filter_map(|(i, light)| Some((i, (*light)?))) {
             let near = || Near::light(t[i], self.plan.light_key(Aov::CryptoMaterial, light), packet.index[i]);
             let nearest = (packet.nearest >> i & 1 == 1).then(|| (near(), depth[i]));
