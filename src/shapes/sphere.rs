@@ -79,13 +79,21 @@ impl Part for SpherePart {
         if !possible.any() {
             return Hit8::none();
         }
-        let close = near & possible;
+        let mut close = near & possible;
+        let bound = if CERTIFY { bound } else { Float8::ZERO };
+        if close.any() {
+            // Rays that begin outside and go away from the center, as those do that have left this very sphere.
+            let slip = roundings(10.0) * (rays.origin.abs() + f.abs()).sum() * rays.dir.abs().sum();
+            let away = Mask8::gt(c, bound) & Mask8::lt(fd, -slip) & Mask8::ge(rays.t_min, Float8::ZERO);
+            let away = close & away;
+            (possible, close) = (possible & !away, close & !away);
+            slack = away.select(float8(f32::NEG_INFINITY), slack);
+        }
         if close.any() {
             c = near_products(close, c, &rays.origin, part);
             let dd = rays.dir.dot(rays.dir);
             slack = close.select(difference_of_products(fd, fd, dd, c) * rays.inv_dd, slack);
         }
-        let bound = if CERTIFY { bound } else { Float8::ZERO };
         if close.any() || !CERTIFY {
             possible = if CERTIFY { !Mask8::lt(slack, -bound) } else { Mask8::ge(slack, Float8::ZERO) };
         }
