@@ -159,7 +159,7 @@ impl Tree {
 
     /// Asks for a child to be brought near before it is looked at.
     #[inline(always)]
-    fn fetch(&self, child: Child) {
+    pub(super) fn fetch(&self, child: Child) {
         match child.content() {
             Content::Node(index) => self.nodes[index].fetch(),
             Content::Leaf(leaf) => self.stores.fetch(leaf.kind, leaf.block),

@@ -314,9 +314,13 @@ impl<const ANY: bool, const CULL: bool> Packets<'_, ANY, CULL> {
                 }
                 Content::Node(index) => {
                     counts.boxes += LANES as u64;
-                    let (entries, met) = self.beams().open(&tree.nodes[index], members);
+                    let opened = &tree.nodes[index];
+                    let (entries, met) = self.beams().open(opened, members);
                     let (node, members) = (index as u32, members as u8);
-                    let waiting = |slot| Waiting { node, slot: slot as u8, members };
+                    let waiting = |slot| {
+                        tree.fetch(opened.child(slot));
+                        Waiting { node, slot: slot as u8, members }
+                    };
                     nearest = stack.nearest_first::<ANY>(&entries, met.bits(), waiting);
                 }
             }
