@@ -10,7 +10,7 @@ use crate::lanes::{Float8, LANES, Mask8, RayPacket, Vec3x8, bits, float8, greate
 /// Rays of a tile.
 const TILE: usize = PACKETS * LANES;
 /// Rays are sorted into a square of cells, so many along an edge.
-const EDGE: usize = 64;
+const EDGE: usize = 128;
 /// Packets that overlap so many times on average are taken apart.
 const OVERLAP: f32 = 1.0;
 /// The cell of dead rays.
@@ -55,7 +55,7 @@ struct Spread {
 
 impl Regroup {
     /// Most tiles at a time.
-    pub const MOST: usize = 64;
+    pub const MOST: usize = 512;
 
     /// The rays in other tiles, where that is worth it in a scene of this size with leaves of this one; dead ones are left
     /// out.
@@ -235,7 +235,7 @@ const EVERY_SECOND: [u16; EDGE] = {
     let (mut table, mut i) = ([0; EDGE], 0);
     while i < EDGE {
         let mut bit = 0;
-        while bit < 8 {
+        while bit < 7 {
             table[i] |= ((i >> bit & 1) << (2 * bit)) as u16;
             bit += 1;
         }

@@ -14,6 +14,10 @@ use crate::tracer::{Found, Hit, RayBatch, Room, TILE, Tracer};
 
 /// Tiles a task: work for some hundred microseconds.
 const CHUNK: usize = 64;
+/// The same of rays that any hit ends: the more of them there are, the closer together are those that share a tile.
+const MOST_CHUNK: usize = 512;
+/// Tasks a thread, where there are rays enough.
+const TASKS: usize = 8;
 
 /// A scene ready to be asked what rays meet, with threads of its own. Rays are in the coordinates of
 /// the scene; answers come in the order of the rays and do not depend on the number of threads.
@@ -125,8 +129,9 @@ impl<'s> Query<'s> {
     pub fn find_occluded(&self, batch: &Batch, dark: &mut [u64]) -> Counts {
         self.pool.install(|| match &self.asked {
             Asked::Tracer(tracer) => {
-                let tasks = dark.par_chunks_mut(CHUNK).enumerate();
-                let trace = |room: &mut Room, (i, dark)| tracer.find_occluded(&batch.columns, i * CHUNK, dark, room);
+                let chunk = (dark.len() / (TASKS * self.threads())).clamp(CHUNK, MOST_CHUNK);
+                let tasks = dark.par_chunks_mut(chunk).enumerate();
+                let trace = |room: &mut Room, (i, dark)| tracer.find_occluded(&batch.columns, i * chunk, dark, room);
                 tasks.map_init(Room::default, trace).reduce(Counts::default, Counts::sum)
             }
             Asked::Reference(reference) => {
