@@ -10,7 +10,7 @@ use crate::plan::Owner;
 use crate::scene::Visible;
 
 /// All parts of one kind. Row `i` is lane `i % 8` of block `i / 8`; each group of parts, a leaf of the tree, has a
-/// block of its own, and rows past its last part cannot be hit.
+/// block of its own. Rows past its last part repeat that: they meet what it meets, and nobody asks for them.
 #[derive(Debug)]
 pub struct Store<P: Part> {
     blocks: Vec<Block<P::Rows>>,
@@ -43,7 +43,8 @@ impl<P: Part> Store<P> {
         };
         let groups: Vec<Group> = sizes.into_iter().map(group).collect();
         let parts_of = |group: &Group| &parts[group.first as usize..][..group.count as usize];
-        let pack = |group: &[P]| Block(P::Rows::pack(std::array::from_fn(|lane| group.get(lane).map(P::row))));
+        let row = |group: &[P], lane: usize| group.get(lane).or(group.last()).map(P::row);
+        let pack = |group: &[P]| Block(P::Rows::pack(std::array::from_fn(|lane| row(group, lane))));
         let blocks = groups.par_iter().map(|group| pack(parts_of(group))).collect();
         let mut sides = Sides::default();
         if visible.iter().any(|side| *side != Visible::Both) {
