@@ -103,7 +103,7 @@ fn parallel_squares_have_their_form_factor() {
         let factor = 2.0 / (PI * x * x) * (log + 2.0 * x * q * (x / q).atan() - 2.0 * x * x.atan());
         let light = area(down(distance * DVec3::Y, 0.5), 3.0);
         for engine in ENGINES {
-            let mut scene = floor(vec![light.clone()], 1.0, 32, 16);
+            let mut scene = floor(vec![light.clone()], 1.0, 32, 64);
             // Below the light in any case.
             scene.cameras[0].eye = 0.25 * DVec3::Y;
             close(mean(&reds(&by(engine, &scene))), 3.0 * factor, 1e-3, (engine, distance));
@@ -141,7 +141,7 @@ fn the_furnace_is_white() {
 #[test]
 fn an_integrating_sphere_multiplies_its_light() {
     let (albedo, radius) = (0.6, 0.25);
-    for (depth, spp) in [(1, 4), (2, 64), (4, 64), (40, 64)] {
+    for (depth, spp) in [(1, 16), (2, 64), (4, 64), (40, 64)] {
         let lamp = Emitter::Sphere { center: DVec3::ZERO, radius };
         let mut scene = Scene { lights: vec![area(lamp, 5.0)], ..scene_of([sphere(DVec3::ZERO, 2.0)]) };
         (scene.materials[0], scene.image) = (gray(albedo), image(32, 32, spp));

@@ -14,7 +14,7 @@ use super::wave::Wave;
 use crate::accel::{PACKETS, Tree};
 use crate::lanes::{Float8, LANES, Mask8, RayPacket, UNIT_ROUNDOFF, Vec3x8, bits, float8};
 use crate::plan::{Plan, Skip};
-use crate::sample::{Pattern, Pattern8, dimension};
+use crate::sample::{Pattern8, dimension};
 use crate::scene::{Integrator, Material, Model, Object, Paint, Scene, Source, Visible};
 use crate::shade::{AreaLight, Drawn, SkyLight};
 
@@ -88,15 +88,18 @@ impl Lamps<'_> {
 #[inline(always)]
 pub(super) fn pairs(wave: &Wave, p: usize, what: u32, seeds: &[Samples8]) -> [[u32; LANES]; 2] {
     let dimension = dimension::at(wave.depth, what);
-    let (mut patterns, mut index) = (Pattern8::default(), [0; LANES]);
+    if let Some(first) = wave.whose.first {
+        let seeds = &seeds[first / LANES + p];
+        return Pattern8::new(&seeds.key, dimension).sample(&seeds.index);
+    }
+    let (mut keys, mut index) = ([0; LANES], [0; LANES]);
     // The lanes behind the last ray of a wave have no sample: any will do.
-    for (lane, index) in index.iter_mut().enumerate() {
+    for lane in 0..LANES {
         let slot = wave.slot(p, lane).min(LANES * seeds.len() - 1);
         let seeds = &seeds[slot / LANES];
-        patterns.set(lane, Pattern::new(seeds.key[slot % LANES], dimension));
-        *index = seeds.index[slot % LANES];
+        (keys[lane], index[lane]) = (seeds.key[slot % LANES], seeds.index[slot % LANES]);
     }
-    patterns.sample(&index)
+    Pattern8::new(&keys, dimension).sample(&index)
 }
 
 impl Direct<'_> {
