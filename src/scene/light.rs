@@ -151,6 +151,11 @@ impl Patches {
         Patches { patches, ends, parallelogram, area: sum }
     }
 
+    /// The corner and the two edges of a parallelogram.
+    pub fn parallelogram(&self) -> Option<[DVec3; 3]> {
+        self.parallelogram.then(|| self.patches[0])
+    }
+
     /// The point of (u, v): u chooses the patch; what is left of it is u again within that, where the point
     /// is `corner + u a + v b` in a parallelogram and `corner + (1 - sqrt u) a + v sqrt u b` in a triangle.
     pub fn point(&self, u: f64, v: f64) -> DVec3 {

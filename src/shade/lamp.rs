@@ -52,6 +52,12 @@ enum Points {
         normal: DVec3,
         area: f64,
     },
+    Parallelogram {
+        corner: [f32; 3],
+        edges: [[f32; 3]; 2],
+        normal: DVec3,
+        area: f64,
+    },
     Polygon {
         patches: Patches,
         normal: DVec3,
@@ -84,6 +90,11 @@ impl AreaLight {
                 let r = u.sqrt();
                 let place = Vec3x8::splat(axes[1]).mul_add(r * sin, Vec3x8::splat(*center));
                 self.draw_place(point, Vec3x8::splat(axes[0]).mul_add(r * cos, place), *normal, *area)
+            }
+            Points::Parallelogram { corner, edges, normal, area } => {
+                let [u, v] = bits.map(unit);
+                let place = Vec3x8::splat(edges[1]).mul_add(v, Vec3x8::splat(*corner));
+                self.draw_place(point, Vec3x8::splat(edges[0]).mul_add(u, place), *normal, *area)
             }
             Points::Polygon { patches, normal } => {
                 let [u, v] = bits.map(|bits| bits.map(sample::unit));
@@ -145,7 +156,7 @@ impl AreaLight {
                 let sin2 = radius * radius / (*center - point).length_squared();
                 (1.0 + (1.0 - sin2).max(0.0).sqrt()) / (TAU * sin2)
             }
-            Points::Disk { normal, area, .. } => flat(normal, *area),
+            Points::Disk { normal, area, .. } | Points::Parallelogram { normal, area, .. } => flat(normal, *area),
             Points::Polygon { patches, normal } => flat(normal, patches.area),
         }
     }
@@ -165,7 +176,11 @@ impl Points {
                 let normal = polygon.normal();
                 let mut moved = polygon.clone();
                 moved.corners.iter_mut().for_each(|corner| *corner -= origin);
-                Points::Polygon { patches: Patches::new(&moved), normal }
+                let patches = Patches::new(&moved);
+                match patches.parallelogram().map(|sides| sides.map(single)) {
+                    Some([corner, a, b]) => Points::Parallelogram { corner, edges: [a, b], normal, area: patches.area },
+                    None => Points::Polygon { patches, normal },
+                }
             }
         }
     }
