@@ -113,8 +113,6 @@ pub(super) fn height_error(normal: Vec3x8, anchor: Vec3x8, f: Vec3x8) -> Float8 
 pub(super) struct Crossing {
     pub t: Float8,
     pub error: Float8,
-    /// `1 / n . dir`.
-    pub inv: Float8,
     /// Lanes in which the ray may as well run beside the plane: nothing is known of `t` there.
     pub beside: Mask8,
 }
@@ -126,13 +124,26 @@ impl Crossing {
         let inv = float8(1.0) / nd;
         let t = height * inv;
         if !CERTIFY {
-            return Crossing { t, error: Float8::ZERO, inv, beside: Mask8::NONE };
+            return Crossing { t, error: Float8::ZERO, beside: Mask8::NONE };
         }
         let slip = roundings(6.0) * dir;
         // Where slip is a quarter of n . dir at most, 4/3 stands for what is of second order.
         let first = t.abs().mul_add(slip, error) * (inv.abs() * float8(4.0 / 3.0));
         let error = t.abs().mul_add(roundings(2.0), first);
-        Crossing { t, error, inv, beside: Mask8::le(nd.abs(), slip * float8(4.0)) }
+        Crossing { t, error, beside: Mask8::le(nd.abs(), slip * float8(4.0)) }
+    }
+
+    /// The same by one bound, which is `slip` and some roundings of the way to there, over the cosine; `dir` is the 1-norm
+    /// of the direction.
+    #[inline(always)]
+    pub fn within<const CERTIFY: bool>(height: Float8, slip: Float8, nd: Float8, dir: Float8) -> Self {
+        let inv = float8(1.0) / nd;
+        let t = height * inv;
+        if !CERTIFY {
+            return Crossing { t, error: Float8::ZERO, beside: Mask8::NONE };
+        }
+        let error = roundings(20.5).mul_add(t.abs() * dir, slip) * inv.abs();
+        Crossing { t, error, beside: Mask8::le(nd.abs(), roundings(24.0) * dir) }
     }
 
     /// Lanes that may be met, and among them those in which that is open.

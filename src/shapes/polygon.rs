@@ -3,9 +3,9 @@
 use glam::{DVec2, DVec3};
 
 use super::disk::round_bounds;
-use super::plane::{Crossing, flat_surface, flat_surface64, height_error, shows, side_hidden};
+use super::plane::{Crossing, flat_surface, flat_surface64, shows, side_hidden};
 use super::{Hidden8, Part, Ray64, Surface8, Surface64, VANISHED, roundings};
-use crate::lanes::{Float8, Hit8, Mask8, RayPacket, Vec3x8, float8};
+use crate::lanes::{Float8, Hit8, Mask8, RayPacket, UNIT_ROUNDOFF, Vec3x8, float8};
 use crate::plan::{Owner, PolygonPart};
 use crate::scene::Visible;
 
@@ -14,8 +14,7 @@ use crate::scene::Visible;
 pub struct Anchor {
     f: Vec3x8,      // from the origin to the center
     height: Float8, // n . f
-    error: Float8,  // of the height
-    slip: Float8,   // of places beside the center, the error of t apart
+    slip: Float8,   // of places on the polygon, but for that of what is as long as the way to there
 }
 
 /// A place that f32 holds, beside `place` and as near the plane through it as there is one: what a corner of f32 loses to
@@ -45,9 +44,9 @@ fn held(place: DVec3, normal: DVec3) -> DVec3 {
 }
 
 impl<const N: usize> Part for PolygonPart<N> {
-    /// A center in the plane and the unit normal; the radius about the center, how far corners lie beside the plane, and
-    /// the axis that edges are seen along (0, 1, 2); by edge the unit vector across it, inward, on the other two axes,
-    /// and how far from the center the edge lies along that.
+    /// A center in the plane and the unit normal; the radius about the center, what places on the polygon are off by
+    /// wherever rays come from, and the axis that edges are seen along (0, 1, 2); by edge the unit vector across it,
+    /// inward, on the other two axes, and how far from the center the edge lies along that.
     type Rows = (([Vec3x8; 2], [Float8; 3]), [[Float8; 3]; N]);
     type Face = [Vec3x8; 2];
     type Anchor = Anchor;
@@ -59,6 +58,7 @@ impl<const N: usize> Part for PolygonPart<N> {
         let (low, high) = self.bounds();
         let middle = low.midpoint(high);
         let center = held(middle + normal * normal.dot(first - middle), normal);
+        let slip = 9.0 * f64::from(UNIT_ROUNDOFF) * center.abs().element_sum() + warp;
         let radius = greatest(&|corner| corner.distance(center));
         let axis = normal.abs().max_position();
         let seen = |corner: DVec3| match axis {
@@ -75,7 +75,7 @@ impl<const N: usize> Part for PolygonPart<N> {
                 None => [0.0, 0.0, f64::NEG_INFINITY], // of a corner that is repeated: all is inside
             }
         };
-        (([center, normal], [radius, warp, axis as f64]), std::array::from_fn(edge))
+        (([center, normal], [radius, slip, axis as f64]), std::array::from_fn(edge))
     }
 
     #[inline(always)]
@@ -84,13 +84,9 @@ impl<const N: usize> Part for PolygonPart<N> {
     }
 
     #[inline(always)]
-    fn anchor(((rows, _), _): &Self::Rows, origin: &Vec3x8) -> Anchor {
-        let [center, normal] = *rows;
-        let f = center - *origin;
-        // The center rounds with the scene, the origin with the camera, f and t dir with every operation, where t dir is as long as f and the way
-        // from the center together.
-        let slip = roundings(7.0).mul_add(f.abs().sum(), roundings(4.0).mul_add(center.abs().sum(), float8(VANISHED)));
-        Anchor { f, height: normal.dot(f), error: height_error(normal, center, f), slip }
+    fn anchor((([center, normal], [_, slip, _]), _): &Self::Rows, origin: &Vec3x8) -> Anchor {
+        let f = *center - *origin;
+        Anchor { f, height: normal.dot(f), slip: roundings(31.0).mul_add(f.abs().sum(), *slip) }
     }
 
     /// `t` comes from the plane, as in equation (6) of the paper; the point there, seen from the center so that
@@ -98,11 +94,19 @@ impl<const N: usize> Part for PolygonPart<N> {
     /// pass an edge more closely than the bound are decided in f64, where touching counts, so no ray slips between two
     /// polygons that share an edge.
     ///
+    /// The bound is one for the place on the ray and for that beside the edges, and generous: few lanes are decided again
+    /// for it, and all pay for a finer one. With d the direction, c the center and f the way to it, in 1-norms, and u a
+    /// rounding, `t` is known to `(4/3)(6u |t d| + 10u |f| + 3.5u |c|)/|n . d| + 2u |t|` (see `height_error` and
+    /// [`Crossing`]), and corners beside the plane are seen aside by `warp |d|/|n . d|`. The point there is off by `|d|` times
+    /// these, and by `10u (|t d| + |f|) + 7u |f| + 4u |c|`: the center rounds with the scene, the origin with the camera, f
+    /// and t d with every operation. As `|n . d| <= |d|`, `|d|/|n . d|` times `20.5u |t d| + 31u |f| + 9u |c| + warp` is more
+    /// than all of it.
+    ///
     /// Source: Kucherov, Morgun and Golenkovskaya, 2016, section IV; the axes as in Badouel, "An efficient ray-polygon
     /// intersection", Graphics Gems, 1990.
     #[inline(always)]
     fn hit<'a, const CULL: bool, const CERTIFY: bool>(
-        ((rows, [_, warp, axis]), edges): &Self::Rows,
+        ((rows, [.., axis]), edges): &Self::Rows,
         anchor: &Anchor,
         rays: &RayPacket,
         hidden: &Hidden8,
@@ -110,7 +114,7 @@ impl<const N: usize> Part for PolygonPart<N> {
     ) -> Hit8 {
         let nd = rows[1].dot(rays.dir);
         let dir = rays.dir.abs().sum();
-        let crossing = Crossing::new::<CERTIFY>(anchor.height, anchor.error, nd, dir);
+        let crossing = Crossing::within::<CERTIFY>(anchor.height, anchor.slip, nd, dir);
         let (mut met, mut open) = crossing.on::<CERTIFY>(rays);
         if CULL {
             met &= !side_hidden(nd, hidden) | open;
@@ -129,9 +133,7 @@ impl<const N: usize> Part for PolygonPart<N> {
             let mask = met & Mask8::ge(least, Float8::ZERO);
             return Hit8 { t: crossing.t, error: Float8::ZERO, mask, doubt: Mask8::NONE };
         }
-        // A corner beside the plane is seen aside by that over the cosine.
-        let along = crossing.error + *warp * crossing.inv.abs();
-        let bound = along.mul_add(dir, x.abs().sum().mul_add(roundings(10.0), anchor.slip));
+        let bound = crossing.error.mul_add(dir, float8(VANISHED));
         let possible = met & !Mask8::lt(least, -bound);
         open &= possible;
         let doubt = open | (possible & !Mask8::gt(least, bound));
