@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 use super::cylinder::{about_axis, ends_missed, of_mantle};
 use super::disk::round_bounds;
 use super::sphere::copysign;
-use super::{Hidden8, Part, Ray64, Surface8, Surface64, VANISHED, VANISHING, roundings};
+use super::{Hidden8, Part, Ray64, Surface8, Surface64, VANISHED, VANISHING, roundings, unit};
 use crate::lanes::{Float8, Hit8, Mask8, RayPacket, Vec3x8, difference_of_products, float8};
 use crate::plan::{ConePart, Owner};
 use crate::scene::Visible;
@@ -179,10 +179,9 @@ impl Part for ConePart {
         let from_tip = rays.dir.mul_add(t - p, rays.dir.mul_add(p, -f));
         let w = from_tip.dot(axis);
         let radial = axis.mul_add(-w, from_tip);
-        let length = radial.length();
         // At the tip there is no radial direction; the way out along the axis stands in for it.
-        let at_tip = !Mask8::gt(length, Float8::ZERO);
-        let radial = Vec3x8::select(at_tip, -axis, radial * (float8(1.0) / length));
+        let at_tip = !Mask8::gt(radial.abs().sum(), Float8::ZERO);
+        let radial = Vec3x8::select(at_tip, -axis, unit(radial));
         let normal = axis.mul_add(-slope, radial).normalize();
         let rho = slope.mul_add(w, radius).fast_max(Float8::ZERO);
         let point = radial.mul_add(at_tip.select(Float8::ZERO, rho), axis.mul_add(w, tip));

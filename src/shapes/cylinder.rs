@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 
 use super::disk::round_bounds;
 use super::sphere::copysign;
-use super::{Hidden8, Part, Ray64, Surface8, Surface64, VANISHING, nearer, roundings};
+use super::{Hidden8, Part, Ray64, Surface8, Surface64, VANISHING, nearer, roundings, unit};
 use crate::lanes::{Float8, Hit8, Mask8, RayPacket, UNIT_ROUNDOFF, Vec3x8, float8};
 use crate::plan::{CylinderPart, Owner};
 use crate::scene::{Visible, basis};
@@ -158,7 +158,7 @@ impl Part for CylinderPart {
         let p = f.dot(rays.dir) * rays.inv_dd;
         let from_base = rays.dir.mul_add(t - p, rays.dir.mul_add(p, -f));
         let w = from_base.dot(axis);
-        let normal = axis.mul_add(-w, from_base).normalize();
+        let normal = unit(axis.mul_add(-w, from_base));
         let point = normal.mul_add(radius, axis.mul_add(w, base));
         let error = roundings(6.0) * (base.abs().sum() + height + radius);
         Surface8::sure(point, normal, error)

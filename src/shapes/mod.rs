@@ -211,6 +211,27 @@ const VANISHING: f32 = 1e-18;
 /// below this.
 const VANISHED: f32 = f32::MIN_POSITIVE;
 
+/// Squared lengths from which on no square that matters has vanished.
+const LEAST_SQUARE: f32 = 1e-26;
+
+/// To unit length, however short; a zero vector gives NaN.
+#[inline(always)]
+fn unit(v: Vec3x8) -> Vec3x8 {
+    let squared = v.length_squared();
+    if Mask8::lt(squared, float8(LEAST_SQUARE)).any() {
+        return unit_of_short(&v);
+    }
+    v * (float8(1.0) / squared.sqrt())
+}
+
+/// A power of two changes no bit of what is long enough.
+#[cold]
+#[inline(never)]
+fn unit_of_short(v: &Vec3x8) -> Vec3x8 {
+    let is_short = Mask8::lt(v.length_squared(), float8(LEAST_SQUARE));
+    Vec3x8::select(is_short, *v * float8(2f32.powi(80)), *v).normalize()
+}
+
 /// The half-width of a decision's doubt, in units of [`UNIT_ROUNDOFF`] of its terms.
 #[inline(always)]
 fn roundings(n: f32) -> Float8 {

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3};
 
-use super::{Hidden8, Part, Ray64, Surface8, Surface64, VANISHED, nearer, roundings};
+use super::{Hidden8, Part, Ray64, Surface8, Surface64, VANISHED, nearer, roundings, unit};
 use crate::lanes::{ExactPacket, Float8, Hit8, LANES, Mask8, RayPacket, Vec3x8, difference_of_products, float8};
 use crate::plan::{Owner, SpherePart};
 use crate::scene::Visible;
@@ -167,7 +167,7 @@ impl Part for SpherePart {
         let f = center - rays.origin;
         let p = f.dot(rays.dir) * rays.inv_dd;
         let perp = rays.dir.mul_add(-p, f);
-        let normal = rays.dir.mul_add(t - p, -perp).normalize();
+        let normal = unit(rays.dir.mul_add(t - p, -perp));
         let by_center = roundings(6.0) * (center.abs().sum() + radius);
         let way = (rays.dir * t).abs().sum();
         let by_ray = roundings(6.0) * (rays.origin.abs().sum() + way + way);

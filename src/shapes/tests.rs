@@ -233,6 +233,44 @@ fn first_row(stores: &Stores, ray: &Ray, primitive: u32) -> Option<(f32, RowRef)
     own.min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
+/// However small a body is, though no square of its size is left in f32.
+#[test]
+fn normals_of_tiny_bodies_are_unit() {
+    for (name, maker) in MAKERS {
+        for scale in [1e-18, 1e-24, 1e-29] {
+            let mut bench = Bench::new(maker, at(0.0), scale, Visible::Both);
+            let references = bench.references();
+            let plan = Plan::new(&bench.scene, DVec3::ZERO);
+            let stores = Stores::new(plan.parts(), None, &plan.visible);
+            let mut judged = 0;
+            for case in 0..3000 {
+                let (dice, primitive) = (&mut bench.dice, case % SHAPES);
+                let origin = dice.direction() * 8.0 * scale;
+                let ray = ray(origin, (dice.in_cube(2.5 * scale) - origin) / scale);
+                let Some(want) = references[primitive].closest(&exact(&ray)) else { continue };
+                let own = Kind::ALL.into_iter().flat_map(|kind| {
+                    let rows = 0..ray_against_rows(&stores, kind, &ray, false).len();
+                    rows.map(move |row| RowRef::new(kind, row))
+                });
+                let normals = own
+                    .filter(|row| {
+                        row.kind().map(|kind| stores.owner(kind, row.row()).primitive) == Some(primitive as u32)
+                    })
+                    .map(|row| {
+                        let lanes = Float8::splat(row.to_lane());
+                        let (surface, _) =
+                            stores.surface::<false>(lanes, &RayPacket::splat(&ray), Float8::splat(want.t as f32), None);
+                        DVec3::from_array(surface.normal.lane(3).map(f64::from))
+                    });
+                let off = normals.map(|normal| (normal - want.normal).length()).fold(f64::INFINITY, f64::min);
+                assert!(off < 1e-3, "{name} {scale:e}: {off:e}");
+                judged += 1;
+            }
+            assert!(judged > 20, "{name}: {judged}");
+        }
+    }
+}
+
 /// The points that light and spawned rays start from: in f64 the reference's own, in f32 no further from
 /// the surface than they say.
 #[test]
