@@ -155,6 +155,7 @@ fn outputs_that_cannot_be_written_are_refused_before_any_work() {
         ("convert none.toml gone/b.toml", 4, "gone/b.toml: cannot be written"),
         ("compare a.exr b.exr --heatmap gone/h.png", 4, "gone/h.png: cannot be written"),
         ("compare a.exr b.exr --heatmap h.exr", 2, "a heat map should end in .png"),
+        ("render scene.toml --frames 1-2 -o f.#.exr --tev 127.0.0.1:9", 2, "--tev shows a single picture, not 2"),
         ("man gone", 4, "cannot be written: there is no directory"),
     ] {
         let (out, err) = room.texts(arguments, code);

@@ -153,3 +153,22 @@ fn a_signal_shows_the_picture_so_far() {
     assert!(signal("-TERM").success());
     child.wait().unwrap();
 }
+
+#[cfg(unix)]
+#[test]
+fn a_signal_shows_a_picture_of_a_batch() {
+    let room = tempfile::tempdir().unwrap();
+    let (list, partial) = (room.path().join("list.jsonl"), room.path().join("a.partial.exr"));
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/mixed.toml");
+    let job = serde_json::json!({ "scene": scene, "output": "a.exr", "resolution": [640, 480], "spp": 4096 });
+    std::fs::write(&list, job.to_string()).unwrap();
+    let mut child =
+        octray().args(["batch", "--quiet", "-t", "1", "--out-dir"]).arg(room.path()).arg(&list).spawn().unwrap();
+    thread::sleep(Duration::from_millis(500));
+    let id = child.id().to_string();
+    let signal = |name: &str| Command::new("kill").args([name, &id]).status().unwrap();
+    assert!(signal("-USR1").success());
+    wait_for(&partial);
+    assert!(signal("-TERM").success());
+    child.wait().unwrap();
+}

@@ -29,7 +29,7 @@ pub fn verify(jobs: &[Job], percent: f64, options: &Options, run: &Run) -> Resul
         durable: false,
         ..options.clone()
     };
-    let mut teller = Teller::new(run, None, None, again.len(), false);
+    let mut teller = Teller::new(run, None, None, true, again.len(), false);
     let summary = run.signals.graceful(|| batch::run(&again, &options, &Sources::default(), &teller))?;
     teller.end(&summary);
     if summary.cancelled {

@@ -118,6 +118,9 @@ pub struct List {
 /// Runs all jobs; a single one ends with its own cause.
 pub fn run(list: List, running: &Running, sources: &Sources, run: &Run) -> Result<Exit, Failure> {
     let List { jobs, many, ledger, resume } = list;
+    if running.tev.is_some() && jobs.len() > 1 {
+        return Err(Failure::new(Exit::Usage, format!("--tev shows a single picture, not {}", jobs.len())));
+    }
     let inputs = check(&jobs, running, run)?;
     let jobs: Vec<Job> = match running.shard {
         None => jobs,
@@ -156,8 +159,8 @@ pub fn run(list: List, running: &Running, sources: &Sources, run: &Run) -> Resul
         annotations: running.annotations,
         checkpoint,
     };
-    let preview = (!many).then(|| Preview::new(run, running.tev.as_deref()));
-    let mut teller = Teller::new(run, running.progress, preview, jobs.len(), running.stats.stats.is_some());
+    let preview = Some(Preview::new(run, running.tev.as_deref()));
+    let mut teller = Teller::new(run, running.progress, preview, many, jobs.len(), running.stats.stats.is_some());
     let summary = run.signals.graceful(|| batch::run(&jobs, &options, sources, &teller))?;
     teller.end(&summary);
     if summary.cancelled {

@@ -21,7 +21,7 @@ use super::pictures::{self, Target};
 const PATIENCE: Duration = Duration::from_secs(5);
 const CHANNELS: [&str; 4] = ["R", "G", "B", "A"];
 
-/// What goes on beside a single render.
+/// What goes on beside a render.
 pub struct Preview<'a> {
     host: Option<&'a str>,
     tev: OnceLock<Option<Tev>>,
@@ -29,12 +29,12 @@ pub struct Preview<'a> {
 }
 
 impl<'a> Preview<'a> {
-    /// With the viewer that the user asked for.
+    /// With the viewer that the user asked for, where there is but one picture.
     pub fn new(run: &'a Run, host: Option<&'a str>) -> Self {
         Preview { host, tev: OnceLock::new(), run }
     }
 
-    /// Shows a block, and writes what there is so far where SIGUSR1 came.
+    /// Shows a block, and writes what there is so far of its picture where SIGUSR1 came.
     pub fn block(&self, job: &Job, renderer: &Renderer, fresh: &Fresh) {
         if let Some(tev) = self.tev.get_or_init(|| self.open(job, renderer)) {
             tev.show(fresh.window, fresh.pixels);

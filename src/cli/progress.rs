@@ -35,7 +35,6 @@ pub struct Teller<'r> {
     run: &'r Run,
     lines: Option<Lines>,
     many: bool,
-    /// Of a single picture.
     preview: Option<Preview<'r>>,
     keep: bool,
     start: Instant,
@@ -51,8 +50,14 @@ struct State {
 
 impl<'r> Teller<'r> {
     /// Begins; with `keep` the reports of all jobs are kept.
-    pub fn new(run: &'r Run, lines: Option<Lines>, preview: Option<Preview<'r>>, jobs: usize, keep: bool) -> Self {
-        let many = preview.is_none();
+    pub fn new(
+        run: &'r Run,
+        lines: Option<Lines>,
+        preview: Option<Preview<'r>>,
+        many: bool,
+        jobs: usize,
+        keep: bool,
+    ) -> Self {
         let hidden = run.console.quiet || lines.is_some();
         let target = match hidden {
             true => ProgressDrawTarget::hidden(),

@@ -160,7 +160,7 @@ impl Args {
             return Ok(Again::Other { path, stored, found });
         }
         let options = Options { threads: self.threads.count(), ..Options::default() };
-        let mut teller = Teller::new(run, None, None, 1, false);
+        let mut teller = Teller::new(run, None, None, true, 1, false);
         let work = || batch::run(std::slice::from_ref(&job), &options, &sources, &teller);
         let summary = run.signals.graceful(work)?;
         teller.end(&summary);
