@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use octray::measure::{Comparison, compare, heatmap};
+use octray::measure::{Channel, Comparison, Spread, compare, heatmap};
 use octray::output::{self, Format, png};
 
 use super::Run;
@@ -23,6 +23,7 @@ Examples:
     after_help = EXAMPLES,
     long_about = "Measure how far apart two pictures are\n\n\
         RMSE, relative MSE and differences are of scene-linear values, PSNR and SSIM of what a display shows. \
+        Differences are those of all channels that both pictures have, all else is of colour and alpha. \
         Ends with 1 where a limit is not kept."
 )]
 pub struct Args {
@@ -39,7 +40,7 @@ pub struct Args {
     /// Most that the root mean square error may be
     #[arg(long, value_name = "X", value_parser = args::limit, allow_negative_numbers = true)]
     max_rmse: Option<f64>,
-    /// Most that any sample may differ by
+    /// Most that any sample may differ by, those of layers included
     #[arg(long, value_name = "X", value_parser = args::limit, allow_negative_numbers = true)]
     max_diff: Option<f64>,
     /// Least that the peak signal-to-noise ratio may be, in dB
@@ -113,10 +114,22 @@ fn table(found: &Comparison) -> String {
     if found.non_finite > 0 {
         line("not finite", format!("{} samples", found.non_finite));
     }
+    for (picture, names) in [("first", &found.only_a), ("second", &found.only_b)] {
+        if !names.is_empty() {
+            line(&format!("only in the {picture}"), names.join(" "));
+        }
+    }
     line("", format!("{:>12} {:>12} {:>12} {:>12} {:>12}", "RMSE", "bias", "median", "99 %", "max"));
-    for channel in &found.channels {
-        let numbers = [channel.rmse, channel.bias, channel.p50, channel.p99, channel.max];
-        line(channel.name, numbers.map(|number| format!("{number:>12.4e}")).join(" "));
+    for Channel { name, different_share, spread } in &found.channels {
+        line(
+            name,
+            match spread {
+                Some(Spread { rmse, bias, p50, p99, max, .. }) => {
+                    [rmse, bias, p50, p99, max].map(|number| format!("{number:>12.4e}")).join(" ")
+                }
+                None => format!("{:.4} % of pixels differ", 100.0 * different_share),
+            },
+        );
     }
     page
 }

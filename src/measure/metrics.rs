@@ -8,7 +8,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::ssim::ssim;
-use crate::film::{Picture, Window};
+use crate::film::{Picture, SampleKind, Samples, Window};
 use crate::output::srgb;
 
 /// What keeps the relative error finite on black, in squared radiance.
@@ -38,18 +38,22 @@ pub struct Comparison {
     /// on Image Processing 13(4), 2004: Gaussian window of 11x11 pixels with standard deviation 1.5, K1 = 0.01,
     /// K2 = 0.03, windows wholly inside the picture (in a smaller picture, one as wide or high as the picture).
     pub ssim: f64,
-    /// The largest difference.
+    /// The largest difference in any channel.
     pub max: Largest,
     /// Pixels with any sample that differs at all, as a share of all pixels.
     pub different_share: f64,
     /// Samples that are not finite in `a` or in `b`.
     pub non_finite: u64,
-    /// Red, green, blue, alpha by themselves.
-    pub channels: [Channel; 4],
+    /// Red, green, blue, alpha by themselves, then the layers that both pictures have, in the order of `a`.
+    pub channels: Vec<Channel>,
+    /// Layers that `b` does not have.
+    pub only_a: Vec<String>,
+    /// Layers that `a` does not have.
+    pub only_b: Vec<String>,
 }
 
 /// The largest absolute difference of linear values; the first such sample of the picture.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Largest {
     /// The difference, >= 0; may be infinite.
     pub value: f64,
@@ -57,15 +61,25 @@ pub struct Largest {
     pub x: i32,
     /// Row in the display window.
     pub y: i32,
-    /// "R", "G", "B" or "A".
-    pub channel: &'static str,
+    /// "R", "G", "B", "A" or the full name of a layer.
+    pub channel: String,
+}
+
+/// One channel of both pictures.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Channel {
+    /// "R", "G", "B", "A" or the full name of a layer.
+    pub name: String,
+    /// Pixels that differ at all, as a share of all pixels.
+    pub different_share: f64,
+    /// How far they differ; `None` of integers, which number things.
+    #[serde(flatten)]
+    pub spread: Option<Spread>,
 }
 
 /// The absolute differences of one channel, linear values.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Channel {
-    /// "R", "G", "B" or "A".
-    pub name: &'static str,
+pub struct Spread {
     /// Root of the mean square.
     pub rmse: f64,
     /// Mean of `a - b`, with its sign: a picture that is brighter as a whole shows here.
@@ -103,21 +117,36 @@ const NAMES: [&str; 4] = ["R", "G", "B", "A"];
 pub fn compare(a: &Picture, b: &Picture) -> Result<Comparison, CompareError> {
     same_size(a, b)?;
     let count = if is_opaque(a) && is_opaque(b) { 3 } else { 4 };
-    let channels: [Channel; 4] = std::array::from_fn(|index| channel(a, b, index));
-    let different = a.pixels.iter().zip(&b.pixels).filter(|(a, b)| pixel_difference(a, b) > 0.0).count();
     let pixels = a.pixels.len();
+    let mut tally = Tally { different: vec![false; pixels], largest: (-1.0, 0, String::new()), non_finite: 0 };
+    let colors: [Channel; 4] = std::array::from_fn(|index| {
+        tally.add(NAMES[index], samples(a, b, index).map(|(a, b)| (f64::from(a), f64::from(b))))
+    });
+    let layers = a.channels.iter().filter_map(|layer| {
+        let (own, other) = (&layer.samples, &b.channel(&layer.name)?.samples);
+        let channel = tally.add(&layer.name, numbers(own).into_iter().zip(numbers(other)));
+        let are_ids = [own, other].iter().all(|samples| samples.kind() == SampleKind::Uint);
+        Some(Channel { spread: channel.spread.filter(|_| !are_ids), ..channel })
+    });
+    let layers: Vec<Channel> = layers.collect();
     let mean = |values: [f64; 4]| values[..count].iter().sum::<f64>() / count as f64;
+    let lacking = |a: &Picture, b: &Picture| {
+        let names = a.channels.iter().map(|layer| layer.name.clone());
+        names.filter(|name| b.channel(name).is_none()).collect()
+    };
     Ok(Comparison {
         schema: 1,
         pixels: pixels as u64,
-        rmse: mean(channels.map(|channel| channel.rmse * channel.rmse)).sqrt(),
+        rmse: mean(colors.each_ref().map(|channel| channel.spread.map_or(0.0, |spread| spread.rmse.powi(2)))).sqrt(),
         rel_mse: mean(std::array::from_fn(|index| relative(a, b, index))),
         psnr: psnr(a, b),
         ssim: ssim(&luma(a), &luma(b), a.window.width()),
-        max: largest(a, b),
-        different_share: different as f64 / pixels as f64,
-        non_finite: non_finite(a, b),
-        channels,
+        max: tally.largest(a.window),
+        different_share: tally.different.iter().filter(|differs| **differs).count() as f64 / pixels as f64,
+        non_finite: tally.non_finite,
+        channels: colors.into_iter().chain(layers).collect(),
+        only_a: lacking(a, b),
+        only_b: lacking(b, a),
     })
 }
 
@@ -134,11 +163,12 @@ pub(super) fn same_size(a: &Picture, b: &Picture) -> Result<(), CompareError> {
 
 /// `a - b`; 0 where both are NaN or the same infinity, infinite where only one is finite.
 #[inline]
-fn difference(a: f32, b: f32) -> f64 {
+fn difference(a: impl Into<f64>, b: impl Into<f64>) -> f64 {
+    let (a, b) = (a.into(), b.into());
     if a == b || (a.is_nan() && b.is_nan()) {
         0.0
     } else if a.is_finite() && b.is_finite() {
-        f64::from(a) - f64::from(b)
+        a - b
     } else {
         f64::INFINITY
     }
@@ -158,24 +188,61 @@ fn samples<'p>(a: &'p Picture, b: &'p Picture, channel: usize) -> impl Iterator<
     a.pixels.iter().zip(&b.pixels).map(move |(a, b)| (a[channel], b[channel]))
 }
 
-fn channel(a: &Picture, b: &Picture, index: usize) -> Channel {
-    let count = a.pixels.len();
-    let mut sizes = Vec::with_capacity(count);
-    let (mut sum, mut squares) = (0.0, 0.0);
-    for (a, b) in samples(a, b, index) {
-        let difference = difference(a, b);
-        sum += difference;
-        squares += difference * difference;
-        sizes.push(difference.abs());
+/// The samples of a layer; f64 holds all of them exactly.
+fn numbers(samples: &Samples) -> Vec<f64> {
+    match samples {
+        Samples::Half(samples) => samples.iter().map(|sample| sample.to_f64()).collect(),
+        Samples::Unrounded(samples) | Samples::Float(samples) => samples.iter().map(|&sample| sample.into()).collect(),
+        Samples::Uint(samples) => samples.iter().map(|&sample| sample.into()).collect(),
     }
-    Channel {
-        name: NAMES[index],
-        rmse: (squares / count as f64).sqrt(),
-        bias: sum / count as f64,
-        p50: percentile(&mut sizes, 50),
-        p95: percentile(&mut sizes, 95),
-        p99: percentile(&mut sizes, 99),
-        max: percentile(&mut sizes, 100),
+}
+
+/// What is told of all channels together.
+struct Tally {
+    /// Of each pixel whether any channel differs.
+    different: Vec<bool>,
+    /// The largest difference, its pixel and its channel.
+    largest: (f64, usize, String),
+    non_finite: u64,
+}
+
+impl Tally {
+    /// Measures a channel by its pairs of samples, one a pixel.
+    fn add(&mut self, name: &str, pairs: impl Iterator<Item = (f64, f64)>) -> Channel {
+        let count = self.different.len();
+        let mut sizes = Vec::with_capacity(count);
+        let (mut sum, mut squares, mut different) = (0.0, 0.0, 0);
+        for (pixel, (a, b)) in pairs.enumerate() {
+            let difference = difference(a, b);
+            let size = difference.abs();
+            sum += difference;
+            squares += difference * difference;
+            sizes.push(size);
+            if size > 0.0 {
+                different += 1;
+                self.different[pixel] = true;
+            }
+            let (most, first, _) = self.largest;
+            if size > most || (size == most && pixel < first) {
+                self.largest = (size, pixel, name.to_owned());
+            }
+            self.non_finite += u64::from(!a.is_finite() || !b.is_finite());
+        }
+        let spread = Spread {
+            rmse: (squares / count as f64).sqrt(),
+            bias: sum / count as f64,
+            p50: percentile(&mut sizes, 50),
+            p95: percentile(&mut sizes, 95),
+            p99: percentile(&mut sizes, 99),
+            max: percentile(&mut sizes, 100),
+        };
+        Channel { name: name.to_owned(), different_share: f64::from(different) / count as f64, spread: Some(spread) }
+    }
+
+    fn largest(&self, window: Window) -> Largest {
+        let (value, pixel, ref channel) = self.largest;
+        let (x, y) = window.pixel(pixel);
+        Largest { value, x, y, channel: channel.clone() }
     }
 }
 
@@ -216,28 +283,10 @@ fn luma(picture: &Picture) -> Vec<f64> {
     picture.pixels.iter().map(luma).collect()
 }
 
-fn largest(a: &Picture, b: &Picture) -> Largest {
-    let mut largest = Largest { value: -1.0, x: 0, y: 0, channel: NAMES[0] };
-    for (index, (a_pixel, b_pixel)) in a.pixels.iter().zip(&b.pixels).enumerate() {
-        for channel in 0..4 {
-            let value = difference(a_pixel[channel], b_pixel[channel]).abs();
-            if value > largest.value {
-                let (x, y) = a.window.pixel(index);
-                largest = Largest { value, x, y, channel: NAMES[channel] };
-            }
-        }
-    }
-    largest
-}
-
-fn non_finite(a: &Picture, b: &Picture) -> u64 {
-    let pairs = a.pixels.as_flattened().iter().zip(b.pixels.as_flattened());
-    pairs.filter(|(a, b)| !a.is_finite() || !b.is_finite()).count() as u64
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film;
 
     pub(super) fn noise(width: u32, height: u32, seed: u32) -> Picture {
         let mut picture = Picture::new((width, height), Window::full((width, height)));
@@ -258,7 +307,7 @@ mod tests {
         let comparison = compare(&picture, &picture.clone()).unwrap();
         assert_eq!((comparison.rmse, comparison.rel_mse, comparison.psnr), (0.0, 0.0, f64::INFINITY));
         assert_eq!((comparison.ssim, comparison.different_share), (1.0, 0.0));
-        assert_eq!(comparison.max, Largest { value: 0.0, x: 0, y: 0, channel: "R" });
+        assert_eq!(comparison.max, Largest { value: 0.0, x: 0, y: 0, channel: "R".into() });
         assert_eq!((comparison.pixels, comparison.non_finite), (1200, 2));
     }
 
@@ -275,12 +324,12 @@ mod tests {
         let step = srgb::encode(0.75) - srgb::encode(0.25);
         close(comparison.psnr, -10.0 * (step * step / 36.0).log10());
         close(comparison.different_share, 1.0 / 12.0);
-        assert_eq!(comparison.max, Largest { value: 0.5, x: 2, y: 1, channel: "G" });
-        let green = comparison.channels[1];
+        assert_eq!(comparison.max, Largest { value: 0.5, x: 2, y: 1, channel: "G".into() });
+        let green = comparison.channels[1].spread.unwrap();
         close(green.rmse, (0.25f64 / 12.0).sqrt());
         close(green.bias, 0.5 / 12.0);
         assert_eq!((green.p50, green.p95, green.p99, green.max), (0.0, 0.5, 0.5, 0.5));
-        assert_eq!(comparison.channels[0].max, 0.0);
+        assert_eq!(comparison.channels[0].spread.unwrap().max, 0.0);
     }
 
     #[test]
@@ -299,7 +348,7 @@ mod tests {
         b.pixels[9][3] = 0.0;
         let comparison = compare(&a, &b).unwrap();
         assert!((comparison.rmse - (1.0f64 / 256.0).sqrt()).abs() < 1e-15);
-        assert_eq!(comparison.max, Largest { value: 1.0, x: 1, y: 1, channel: "A" });
+        assert_eq!(comparison.max, Largest { value: 1.0, x: 1, y: 1, channel: "A".into() });
     }
 
     #[test]
@@ -310,11 +359,36 @@ mod tests {
         for (a, b) in [(&a, &b), (&b, &a)] {
             let comparison = compare(a, b).unwrap();
             assert!(comparison.rmse > 1e30 && comparison.rel_mse > 1e30 && comparison.psnr < -1e30);
-            assert_eq!(comparison.max, Largest { value: f64::INFINITY, x: 4, y: 1, channel: "B" });
+            assert_eq!(comparison.max, Largest { value: f64::INFINITY, x: 4, y: 1, channel: "B".into() });
             assert!(comparison.ssim < 1.0 && comparison.non_finite == 1);
             let json = serde_json::to_value(&comparison).unwrap();
             assert!(json["rmse"].is_null() && json["max"]["value"].is_null());
         }
+    }
+
+    #[test]
+    fn layers_are_compared() {
+        let layer = |name: &str, samples| film::Channel { name: name.into(), samples };
+        let (mut a, mut b) = (noise(2, 1, 5), noise(2, 1, 5));
+        let names = |a: u32| Samples::Uint(vec![a, 7].into());
+        a.channels = vec![
+            layer("depth.Z", Samples::Float(vec![1.0, 2.0].into())),
+            layer("id.object", names(900)),
+            layer("uv.U", Samples::Float(vec![0.0; 2].into())),
+        ];
+        b.channels = vec![
+            layer("normal.X", Samples::halves(&[0.0; 2])),
+            layer("id.object", names(1)),
+            layer("depth.Z", Samples::halves(&[1.0, 7.0])),
+        ];
+        let found = compare(&a, &b).unwrap();
+        assert_eq!((found.rmse, found.different_share), (0.0, 1.0));
+        assert_eq!(found.max, Largest { value: 899.0, x: 0, y: 0, channel: "id.object".into() });
+        let [depth, ids] = &found.channels[4..] else { panic!("{:?}", found.channels) };
+        assert_eq!((depth.name.as_str(), depth.different_share), ("depth.Z", 0.5));
+        assert_eq!(depth.spread.map(|spread| (spread.max, spread.bias)), Some((5.0, -2.5)));
+        assert_eq!((ids.name.as_str(), ids.different_share, ids.spread), ("id.object", 0.5, None));
+        assert_eq!((found.only_a, found.only_b), (vec!["uv.U".to_owned()], vec!["normal.X".to_owned()]));
     }
 
     #[test]

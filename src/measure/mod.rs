@@ -17,4 +17,4 @@ mod ssim;
 pub mod stress;
 
 pub use self::heatmap::heatmap;
-pub use self::metrics::{CompareError, Comparison, compare};
+pub use self::metrics::{Channel, CompareError, Comparison, Spread, compare};
