@@ -239,20 +239,18 @@ fn stored_hash(headers: &[Header]) -> Option<String> {
     })
 }
 
-/// The first part with colours that is read.
+/// The first part with colours that is read, or else with a part of them, or else with anything.
 fn color_part(headers: &[Header]) -> Result<usize, Fault> {
-    let has_color = |header: &Header| match has(header, "R") {
-        true => has(header, "G") && has(header, "B"),
-        false => has(header, "Y"),
+    let whole = |header: &Header| match is_grey(header) {
+        true => has(header, "Y"),
+        false => COLORS.iter().all(|name| has(header, name)),
     };
-    let found = headers.iter().position(|header| unread(header).is_none() && has_color(header));
-    found.ok_or_else(|| {
-        let Some(first) = headers.first() else { return Fault::Damaged("it has no header".into()) };
-        if let Some(reason) = unread(first) {
-            return Fault::Unsupported(reason.into());
-        }
-        let names: Vec<_> = first.channels.list.iter().take(12).map(|channel| channel.name.to_string()).collect();
-        Fault::Unsupported(format!("its first part has no channels R G B, but {}", names.join(" ")))
+    let first =
+        |holds: &dyn Fn(&Header) -> bool| headers.iter().position(|header| unread(header).is_none() && holds(header));
+    let found = first(&whole).or_else(|| first(&|header| !is_grey(header))).or_else(|| first(&|_| true));
+    found.ok_or_else(|| match headers.first().map(unread) {
+        Some(Some(reason)) => Fault::Unsupported(reason.into()),
+        _ => Fault::Damaged("it has no header".into()),
     })
 }
 
@@ -266,15 +264,22 @@ fn unread(header: &Header) -> Option<&'static str> {
 
 /// Which samples of a pixel a channel becomes.
 fn color_slot(header: &Header, name: &[u8]) -> Option<&'static [usize]> {
-    let grey = !has(header, "R");
+    let grey = is_grey(header);
     match name {
         b"R" => Some(&[0]),
-        b"G" if !grey => Some(&[1]),
-        b"B" if !grey => Some(&[2]),
+        b"G" => Some(&[1]),
+        b"B" => Some(&[2]),
         b"A" => Some(&[3]),
         b"Y" if grey => Some(&[0, 1, 2]),
         _ => None,
     }
+}
+
+const COLORS: [&str; 3] = ["R", "G", "B"];
+
+/// Whether it has none of the colours.
+fn is_grey(header: &Header) -> bool {
+    !COLORS.iter().any(|name| has(header, name))
 }
 
 fn has(header: &Header, name: &str) -> bool {
@@ -499,15 +504,21 @@ mod tests {
     }
 
     #[test]
-    fn a_file_without_colors_says_what_it_has() {
-        let channels = SpecificChannels::build().with_channel("depth.Z").with_pixel_fn(|_| (1f32,));
-        let mut bytes = Cursor::new(Vec::new());
-        Image::from_channels((4, 4), channels).write().to_buffered(&mut bytes).unwrap();
-        let found = decoded(&bytes.into_inner());
-        assert_eq!(found, Err("its first part has no channels R G B, but depth.Z".into()));
-        let channels = SpecificChannels::build().with_channel("Y").with_pixel_fn(|_| (0.25f32,));
-        let mut bytes = Cursor::new(Vec::new());
-        Image::from_channels((2, 1), channels).write().to_buffered(&mut bytes).unwrap();
-        assert_eq!(decoded(&bytes.into_inner()).unwrap().pixels, [[0.25, 0.25, 0.25, 1.0]; 2]);
+    fn colors_that_a_file_lacks_are_black() {
+        let alone = |name: &str| {
+            let channels = SpecificChannels::build().with_channel(name).with_pixel_fn(|_| (0.25f32,));
+            let mut bytes = Cursor::new(Vec::new());
+            Image::from_channels((2, 1), channels).write().to_buffered(&mut bytes).unwrap();
+            let picture = decoded(&bytes.into_inner()).unwrap();
+            assert_eq!(picture.pixels[0], picture.pixels[1]);
+            (picture.pixels[0], picture.channels.iter().map(|channel| channel.name.clone()).collect::<Vec<_>>())
+        };
+        assert_eq!(alone("Y"), ([0.25, 0.25, 0.25, 1.0], vec![]));
+        assert_eq!(alone("R"), ([0.25, 0.0, 0.0, 1.0], vec![]));
+        assert_eq!(alone("B"), ([0.0, 0.0, 0.25, 1.0], vec![]));
+        assert_eq!(alone("A"), ([0.0, 0.0, 0.0, 0.25], vec![]));
+        for layer in ["Z", "depth.Z", "left.R"] {
+            assert_eq!(alone(layer), ([0.0, 0.0, 0.0, 1.0], vec![layer.to_owned()]));
+        }
     }
 }
