@@ -5,12 +5,13 @@
 //! of the two of 256 around it by a fixed table of 8 x 8 places (dither), the nearest without it. A picture that is
 //! opaque in halves has no alpha channel, so that a picture gives the same file whether it went through a half-float
 //! EXR or not, but for a code's difference.
-//! The `sRGB` chunk says which curve it was; the crate adds the matching `gAMA` and `cHRM`.
+//! The `sRGB` chunk says which curve it was, `gAMA` and `cHRM` say it to readers that do not know that one.
 
 use half::f16;
-use png::{BitDepth, ColorType, Compression, Encoder, SrgbRenderingIntent};
+use png::{BitDepth, ColorType, Compression, Encoder, ScaledFloat, SourceChromaticities, SrgbRenderingIntent};
 use rayon::prelude::*;
 
+use super::color::Primaries;
 use super::description::{self, Description};
 use super::display::Shown;
 use super::{Display, EncodeError, Losses, srgb};
@@ -171,6 +172,9 @@ fn file(
     encoder.set_depth(depth);
     encoder.set_compression(Compression::Fast);
     encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
+    encoder.set_source_gamma(ScaledFloat::from_scaled(45455));
+    let [red, green, blue, white] = Primaries::REC709.xy.map(|xy| (xy.x as f32, xy.y as f32));
+    encoder.set_source_chromaticities(SourceChromaticities::new(white, red, green, blue));
     encoder.add_text_chunk("Software".into(), description::software()).map_err(EncodeError::new)?;
     if let Some(title) = title {
         // International text: a scene's name need not be Latin-1.
@@ -203,7 +207,9 @@ mod tests {
         let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
         let mut samples = vec![0; reader.output_buffer_size().unwrap()];
         let info = reader.next_frame(&mut samples).unwrap();
-        assert_eq!(reader.info().srgb, Some(SrgbRenderingIntent::Perceptual));
+        let said = reader.info();
+        assert_eq!(said.srgb, Some(SrgbRenderingIntent::Perceptual));
+        assert!(said.gama_chunk.is_some() && said.chrm_chunk.is_some());
         (info, samples)
     }
 
