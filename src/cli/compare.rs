@@ -3,8 +3,9 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
+use octray::film::Picture;
 use octray::measure::{Channel, Comparison, Spread, compare, heatmap};
-use octray::output::{self, Format, png};
+use octray::output::{self, Contents, Format, png};
 
 use super::Run;
 use super::args;
@@ -58,7 +59,7 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
         }
         run.check_output(path, &[&args.a, &args.b])?;
     }
-    let (a, b) = (output::read(&args.a)?, output::read(&args.b)?);
+    let [a, b] = read(args, run)?;
     let comparison = compare(&a, &b)?;
     if let Some(path) = &args.heatmap {
         let title = format!("{} - {}", args.a.display(), args.b.display());
@@ -75,6 +76,21 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
     let broken = args.broken_limits(&comparison);
     broken.iter().for_each(|limit| run.console.note(&format!("octray: {limit}")));
     Ok(if broken.is_empty() { Exit::Done } else { Exit::No })
+}
+
+/// Both pictures. Where transparent edges were left out of one of them, their colours as they were rendered.
+fn read(args: &Args, run: &Run) -> Result<[Picture; 2], Failure> {
+    let found = [output::read_all(&args.a)?, output::read_all(&args.b)?];
+    if found[0].picture.window == found[1].picture.window {
+        return Ok(found.map(|found| found.picture));
+    }
+    Ok(found.map(|Contents { picture, attributes, .. }| {
+        let Some(window) = attributes.and_then(|attributes| attributes.rendered(&picture)) else { return picture };
+        if !picture.channels.is_empty() {
+            run.console.warn("layers are not compared: transparent edges were left out");
+        }
+        picture.colors_in(window)
+    }))
 }
 
 impl Args {

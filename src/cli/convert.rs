@@ -90,8 +90,9 @@ fn convert_scene(args: &Args, run: &Run) -> Result<Exit, Failure> {
 
 fn convert_picture(args: &Args, run: &Run) -> Result<Exit, Failure> {
     let target = Target::new(&args.output, &[&args.input], run)?;
-    let options = args.depth.options(&target, run)?;
-    let found = output::read_all(&args.input)?;
+    let mut options = args.depth.options(&target, run)?;
+    let found = vec![(args.input.as_path(), output::read_as_stored(&args.input)?)];
+    let Some(found) = pictures::ready(found, (&target, &mut options), run)?.pop() else { return Ok(Exit::Done) };
     // What the header says of the scene is the title of a PNG, as it is of one that is rendered.
     let scene = found.attributes.as_ref().and_then(|attributes| attributes.text("render/scene"));
     let rendered = found.attributes.as_ref().and_then(|attributes| attributes.rendered(&found.picture));

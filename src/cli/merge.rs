@@ -23,7 +23,8 @@ const COMMON: [&str; 4] = ["render/sceneHash", "render/seed", "render/spp", "ren
     after_help = EXAMPLES,
     long_about = "Join crops of one frame to the frame\n\n\
         Every pixel has to be in a part, and where parts overlap they have to agree to the bit. Scene hash, seed, \
-        samples and frame have to be the same. The result is, to the byte, what one render with --no-date writes."
+        samples and frame have to be the same. The result is, to the byte, what one render with --no-date writes; without \
+        --color its colours are those of the first part."
 )]
 pub struct Args {
     /// Crops, EXR
@@ -42,7 +43,7 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
     let mut options = args.depth.options(&target, run)?;
     let mut parts = Vec::new();
     for path in &args.parts {
-        let part = output::read_all(path)?;
+        let part = output::read_as_stored(path)?;
         check(path, &part)?;
         parts.push(part);
     }
@@ -54,6 +55,8 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
             COMMON[0]
         ));
     }
+    options.exr.color = run.color_space.or(parts[0].storage.map(|storage| storage.color)).unwrap_or_default();
+    let parts = pictures::ready(inputs.into_iter().zip(parts).collect(), (&target, &mut options), run)?;
     options.exr.float |= parts.iter().any(|part| part.float);
     let kept = parts[0].attributes.clone().map(|attributes| attributes.without_run());
     let pictures: Vec<Picture> = parts.into_iter().map(|part| part.picture).collect();

@@ -7,8 +7,8 @@ use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum};
 use octray::film::Picture;
 use octray::output::{
-    self, Bits, Coding, Compression, Description, Display, EncodeError, Encoded, Format, Losses, Options, OutputError,
-    Storage, ToneMap, aside,
+    self, Bits, Coding, Compression, Contents, Description, Display, EncodeError, Encoded, Format, Losses, Options,
+    OutputError, Storage, ToneMap, aside,
 };
 
 use super::Run;
@@ -185,6 +185,7 @@ impl Depth {
             root_depth: self.depth_name.as_deref() == Some("Z"),
             color: run.color_space.unwrap_or_default(),
             sidecar: self.crypto_sidecar,
+            ..Storage::default()
         }
     }
 
@@ -197,6 +198,28 @@ impl Depth {
         let bits = if self.bits.as_deref() == Some("16") { Bits::Sixteen } else { Bits::Eight };
         Coding { bits, display, dither: !self.no_dither }
     }
+}
+
+/// Pictures of files to be written as these options say. Colours stay in the primaries of the files where the target has the
+/// same, so that they keep their bits. Says where names are missing.
+pub fn ready(
+    files: Vec<(&Path, Contents)>,
+    (target, options): (&Target, &mut Options),
+    run: &Run,
+) -> Result<Vec<Contents>, Failure> {
+    for (path, found) in &files {
+        found.unnamed.iter().for_each(|fault| run.console.warn(&format!("{}: {fault}", path.display())));
+    }
+    let color = |found: &Contents| found.storage.map(|storage| storage.color);
+    if target.format() == Format::Exr && files.iter().all(|(_, found)| color(found) == Some(options.exr.color)) {
+        options.exr.given = options.exr.color;
+        return Ok(files.into_iter().map(|(_, found)| found).collect());
+    }
+    let in_rec709 = |(path, found): (&Path, Contents)| {
+        let none = || Failure::new(Exit::Input, "is damaged: its chromaticities span no colours").of(path);
+        found.in_rec709().ok_or_else(none)
+    };
+    files.into_iter().map(in_rec709).collect()
 }
 
 /// Writes a picture whole, or not at all, and says what the format could not hold.

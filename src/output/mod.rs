@@ -24,7 +24,7 @@ pub use self::description::{Description, Run};
 pub use self::display::{Display, ToneMap};
 pub use self::exr::{Attributes, Beside, ColorSpace, Compression, Encoded, Storage};
 pub use self::png::{Bits, Coding};
-pub use self::read::{Contents, HashPair, ReadError, read, read_all};
+pub use self::read::{Contents, HashPair, ReadError, read, read_all, read_as_stored};
 use crate::film::Picture;
 
 /// The kinds of file that a picture can become.
@@ -147,9 +147,10 @@ pub fn encode(
     }
 }
 
-/// The name of a file without directory and extension, after which files beside it are named.
+/// The name of a file without directory and extension, after which files beside it are named; beside standard output,
+/// `-`, there are none.
 pub fn stem(path: &Path) -> Option<String> {
-    path.file_stem().map(|stem| stem.to_string_lossy().into_owned())
+    path.file_stem().filter(|_| path.as_os_str() != "-").map(|stem| stem.to_string_lossy().into_owned())
 }
 
 /// Why a picture cannot be encoded: it is not whole, or too large for the format.

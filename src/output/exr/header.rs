@@ -108,7 +108,7 @@ fn image_attributes(
     let mut attributes = kept.unwrap_or_else(|| ImageAttributes::new(frame));
     attributes.display_window = frame;
     attributes.other.retain(|name, _| is_sound(name.as_slice()));
-    attributes.chromaticities = Some(chromaticities(storage.primaries()));
+    attributes.chromaticities = Some(chromaticities(storage.color.primaries()));
     Ok(attributes)
 }
 

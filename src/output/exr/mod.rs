@@ -111,15 +111,17 @@ pub struct Storage {
     pub multipart: bool,
     /// Depth as the channel `Z` instead of `depth.Z`.
     pub root_depth: bool,
-    /// The primaries of colour, albedo and variance.
+    /// The primaries of colour, albedo and variance in the file.
     pub color: ColorSpace,
+    /// Those that the picture is in.
+    pub given: ColorSpace,
     /// The manifests of Cryptomattes in files beside the picture's, whatever their size.
     pub sidecar: bool,
 }
 
-impl Storage {
+impl ColorSpace {
     fn primaries(self) -> Primaries {
-        match self.color {
+        match self {
             ColorSpace::Rec709 => Primaries::REC709,
             ColorSpace::AcesCg => Primaries::ACESCG,
         }

@@ -21,9 +21,9 @@ use rayon::prelude::*;
 
 use super::header::PIXEL_HASH;
 use super::layout::{self, Part};
-use super::{ColorSpace, Encoded, Storage, header, manifest, sort, text, zip};
+use super::{Encoded, Storage, header, manifest, sort, text, zip};
 use crate::film::{Cryptomatte, Picture, Window};
-use crate::output::color::{self, Primaries};
+use crate::output::color;
 use crate::output::pixel_hash::{Digests, PixelHash};
 use crate::output::{Description, EncodeError, Losses};
 
@@ -67,7 +67,8 @@ impl Packer {
         let parts = layout::parts(&picture, storage)?;
         let headers = header::headers(&picture, &parts, storage, &Description::default(), &[])?;
         let requirements = MetaData::validate(&headers, true).map_err(EncodeError::new)?;
-        let matrix = Primaries::REC709.matrix_to(storage.primaries()).filter(|_| storage.color != ColorSpace::Rec709);
+        let Storage { given, color, .. } = storage;
+        let matrix = given.primaries().matrix_to(color.primaries()).filter(|_| color != given);
         Ok(Packer {
             picture,
             storage,

@@ -19,6 +19,7 @@ const FLOAT: Storage = Storage {
     multipart: false,
     root_depth: false,
     color: ColorSpace::Rec709,
+    given: ColorSpace::Rec709,
     sidecar: false,
 };
 

@@ -18,7 +18,7 @@ use half::f16;
 use super::mattes;
 use super::{Contents, Fault, HashPair, check_length, check_pixels};
 use crate::film::{Channel, Picture, SampleKind, Samples, Window};
-use crate::output::color::{self, Primaries};
+use crate::output::color::Primaries;
 use crate::output::exr::{Attributes, ColorSpace, PIXEL_HASH, Storage};
 use crate::output::pixel_hash::{Digests, PixelHash};
 
@@ -176,16 +176,16 @@ impl Plan {
         directory: &Path,
     ) -> Result<Contents, Fault> {
         let header = &headers[self.color];
-        picture.cryptomattes = mattes::read(headers, directory);
-        if let Some(matrix) = to_rec709(header)? {
-            picture = color::converted(&picture, matrix).into_owned();
-        }
+        let mut unnamed = Vec::new();
+        picture.cryptomattes = mattes::read(headers, directory, &mut unnamed);
         let is_float = |channel: &ChannelDescription| {
             color_slot(header, channel.name.as_slice()).is_some() && channel.sample_type != SampleType::F16
         };
         let float = header.channels.list.iter().any(is_float);
         Ok(Contents {
             picture,
+            primaries: primaries(header).filter(|primaries| !primaries.is_near(&Primaries::REC709)),
+            unnamed,
             float,
             storage: Some(storage(headers, header, float)),
             attributes: Some(Attributes {
@@ -291,16 +291,6 @@ fn primaries(header: &Header) -> Option<Primaries> {
     let found = header.shared_attributes.chromaticities?;
     let xy = [found.red, found.green, found.blue, found.white].map(|Vec2(x, y)| DVec2::new(x.into(), y.into()));
     Some(Primaries { xy })
-}
-
-/// The matrix that takes the file's colours to Rec. 709, where they are others.
-fn to_rec709(header: &Header) -> Result<Option<glam::DMat3>, Fault> {
-    let Some(primaries) = primaries(header) else { return Ok(None) };
-    if primaries.is_near(&Primaries::REC709) {
-        return Ok(None);
-    }
-    let matrix = primaries.matrix_to(Primaries::REC709);
-    matrix.map(Some).ok_or_else(|| Fault::Damaged("its chromaticities span no colours".into()))
 }
 
 impl Part {

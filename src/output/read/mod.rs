@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
+use super::color::{self, Primaries};
 use super::exr::{Attributes, Storage};
 use crate::film::Picture;
 
@@ -64,8 +65,12 @@ enum Fault {
 /// What a file holds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contents {
-    /// The picture with its layers, linear Rec. 709 and premultiplied.
+    /// The picture with its layers, linear and premultiplied.
     pub picture: Picture,
+    /// The primaries of its colours, where not those of Rec. 709: [`read_all`] leaves none.
+    primaries: Option<Primaries>,
+    /// What is wrong with manifests of Cryptomattes, whose names are missing then.
+    pub unnamed: Vec<String>,
     /// Whether colour has more bits than halves.
     pub float: bool,
     /// Of an EXR: how its samples are stored, whatever makes up their hash.
@@ -74,6 +79,17 @@ pub struct Contents {
     pub attributes: Option<Attributes>,
     /// The hash of its samples that an EXR states, and the one that they have.
     pub pixel_hash: Option<HashPair>,
+}
+
+impl Contents {
+    /// With all colours linear Rec. 709; `None` where the primaries span no colours.
+    pub fn in_rec709(mut self) -> Option<Self> {
+        if let Some(primaries) = self.primaries.take() {
+            let matrix = primaries.matrix_to(Primaries::REC709)?;
+            self.picture = color::converted(&self.picture, matrix).into_owned();
+        }
+        Some(self)
+    }
 }
 
 /// A hash as it is stated, and as it is.
@@ -105,6 +121,17 @@ pub fn read(path: &Path) -> Result<Picture, ReadError> {
 /// # Errors
 /// Any [`ReadError`]; each names the path and the cause.
 pub fn read_all(path: &Path) -> Result<Contents, ReadError> {
+    let contents = read_as_stored(path)?;
+    contents
+        .in_rec709()
+        .ok_or_else(|| ReadError::Damaged { path: path.into(), reason: "its chromaticities span no colours".into() })
+}
+
+/// The same in the primaries of the file.
+///
+/// # Errors
+/// Any [`ReadError`]; each names the path and the cause.
+pub fn read_as_stored(path: &Path) -> Result<Contents, ReadError> {
     let io = |source| ReadError::Io { path: path.into(), source };
     let file = File::open(path).map_err(io)?;
     let found = file.metadata().map_err(io)?;
@@ -119,6 +146,8 @@ pub fn read_all(path: &Path) -> Result<Contents, ReadError> {
     } else if head.starts_with(b"\x89PNG\r\n\x1a\n") {
         png::read(reader, length).map(|(picture, float)| Contents {
             picture,
+            primaries: None,
+            unnamed: Vec::new(),
             float,
             storage: None,
             attributes: None,
