@@ -97,7 +97,7 @@ impl<const N: usize> Part for PolygonPart<N> {
     /// The bound is one for the place on the ray and for that beside the edges, and generous: few lanes are decided again
     /// for it, and all pay for a finer one. With d the direction, c the center and f the way to it, in 1-norms, and u a
     /// rounding, `t` is known to `(4/3)(6u |t d| + 10u |f| + 3.5u |c|)/|n . d| + 2u |t|` (see `height_error` and
-    /// [`Crossing`]), and corners beside the plane are seen aside by `warp |d|/|n . d|`. The point there is off by `|d|` times
+    /// `Crossing`), and corners beside the plane are seen aside by `warp |d|/|n . d|`. The point there is off by `|d|` times
     /// these, and by `10u (|t d| + |f|) + 7u |f| + 4u |c|`: the center rounds with the scene, the origin with the camera, f
     /// and t d with every operation. As `|n . d| <= |d|`, `|d|/|n . d|` times `20.5u |t d| + 31u |f| + 9u |c| + warp` is more
     /// than all of it.
