@@ -24,7 +24,8 @@ Examples:
     after_help = EXAMPLES,
     long_about = "Measure how far apart two pictures are\n\n\
         RMSE, relative MSE and differences are of scene-linear values, PSNR and SSIM of what a display shows. \
-        Differences are those of all channels that both pictures have, all else is of colour and alpha. \
+        The largest difference and the share of different pixels are of all channels that both pictures have (ids, and \
+        those of Cryptomattes, differ by 1 or not at all), the RMSE, PSNR and SSIM of colour and alpha. \
         Ends with 1 where a limit is not kept."
 )]
 pub struct Args {

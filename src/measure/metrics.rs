@@ -8,7 +8,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::ssim::ssim;
-use crate::film::{Picture, SampleKind, Samples, Window};
+use crate::film::{self, Cryptomatte, Picture, SampleKind, Samples, Window};
 use crate::output::srgb;
 
 /// What keeps the relative error finite on black, in squared radiance.
@@ -38,7 +38,7 @@ pub struct Comparison {
     /// on Image Processing 13(4), 2004: Gaussian window of 11x11 pixels with standard deviation 1.5, K1 = 0.01,
     /// K2 = 0.03, windows wholly inside the picture (in a smaller picture, one as wide or high as the picture).
     pub ssim: f64,
-    /// The largest difference in any channel.
+    /// The largest difference in any channel; ids differ by 1 or not at all.
     pub max: Largest,
     /// Pixels with any sample that differs at all, as a share of all pixels.
     pub different_share: f64,
@@ -124,9 +124,13 @@ pub fn compare(a: &Picture, b: &Picture) -> Result<Comparison, CompareError> {
     });
     let layers = a.channels.iter().filter_map(|layer| {
         let (own, other) = (&layer.samples, &b.channel(&layer.name)?.samples);
-        let channel = tally.add(&layer.name, numbers(own).into_iter().zip(numbers(other)));
-        let are_ids = [own, other].iter().all(|samples| samples.kind() == SampleKind::Uint);
-        Some(Channel { spread: channel.spread.filter(|_| !are_ids), ..channel })
+        let pairs = numbers(own).into_iter().zip(numbers(other));
+        if ![a, b].into_iter().all(|picture| holds_ids(picture, &layer.name)) {
+            return Some(tally.add(&layer.name, pairs));
+        }
+        // What is next to a number is no more like it than any other.
+        let channel = tally.add(&layer.name, pairs.map(|(a, b)| (f64::from(u8::from(a != b)), 0.0)));
+        Some(Channel { spread: None, ..channel })
     });
     let layers: Vec<Channel> = layers.collect();
     let mean = |values: [f64; 4]| values[..count].iter().sum::<f64>() / count as f64;
@@ -186,6 +190,14 @@ fn is_opaque(picture: &Picture) -> bool {
 /// Pairs of samples of one channel.
 fn samples<'p>(a: &'p Picture, b: &'p Picture, channel: usize) -> impl Iterator<Item = (f32, f32)> + 'p {
     a.pixels.iter().zip(&b.pixels).map(move |(a, b)| (a[channel], b[channel]))
+}
+
+/// Whether a layer numbers things, as hashes of Cryptomattes do in floats.
+fn holds_ids(picture: &Picture, layer: &str) -> bool {
+    let is_rank =
+        |matte: &Cryptomatte| layer.starts_with(&matte.name) && (layer.ends_with(".R") || layer.ends_with(".B"));
+    let is_uint = |channel: &film::Channel| channel.samples.kind() == SampleKind::Uint;
+    picture.channel(layer).is_some_and(is_uint) || picture.cryptomattes.iter().any(is_rank)
 }
 
 /// The samples of a layer; f64 holds all of them exactly.
@@ -286,7 +298,6 @@ fn luma(picture: &Picture) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film;
 
     pub(super) fn noise(width: u32, height: u32, seed: u32) -> Picture {
         let mut picture = Picture::new((width, height), Window::full((width, height)));
@@ -383,7 +394,7 @@ mod tests {
         ];
         let found = compare(&a, &b).unwrap();
         assert_eq!((found.rmse, found.different_share), (0.0, 1.0));
-        assert_eq!(found.max, Largest { value: 899.0, x: 0, y: 0, channel: "id.object".into() });
+        assert_eq!(found.max, Largest { value: 5.0, x: 1, y: 0, channel: "depth.Z".into() });
         let [depth, ids] = &found.channels[4..] else { panic!("{:?}", found.channels) };
         assert_eq!((depth.name.as_str(), depth.different_share), ("depth.Z", 0.5));
         assert_eq!(depth.spread.map(|spread| (spread.max, spread.bias)), Some((5.0, -2.5)));
