@@ -111,12 +111,12 @@ pub fn read(path: &Path) -> Result<Picture, ReadError> {
 
 /// Reads a picture, linear Rec. 709 and premultiplied, and what stands beside it.
 ///
-/// EXR: colour is that of the first part with channels `R G B` (and `A`, else 1) or `Y`, in the primaries that the file
-/// states, and what there is none of is black; all other channels of all flat parts are layers, with the name of their part before theirs where they have
-/// none. Types are half, float or uint, compressions all but HTJ2K; layers that cover other pixels than the colour
-/// are cut or filled up with 0. Where the display window begins elsewhere than at (0, 0), all windows move. PNG: any
-/// depth and colour type, by the sRGB curve whatever its chunks say, alpha multiplied in; its window is the full
-/// frame.
+/// EXR: colour is that of the first part with channels `R G B` (and `A`, else 1) or `Y`, in the primaries that the
+/// file states, and what there is none of is black; all other channels of all flat parts are layers, with the name
+/// of their part before theirs where they have none. Types are half, float or uint, compressions all but HTJ2K;
+/// layers that cover other pixels than the colour are cut or filled up with 0. Where the display window begins
+/// elsewhere than at (0, 0), all windows move. PNG: any depth and colour type, by the sRGB curve whatever its
+/// chunks say, alpha multiplied in; its window is the full frame.
 ///
 /// # Errors
 /// Any [`ReadError`]; each names the path and the cause.
