@@ -71,7 +71,17 @@ fn more_memory_than_allowed_is_refused() {
     let room = Room::new();
     let ask = "render scene.toml -o one.exr --spp 1 -q --resolution 1000x1000";
     room.run(&format!("{ask} --max-memory 60M")).success();
-    for words in [" --max-memory 20M", " --max-memory 60M --aov all"] {
+    // Rows that are packed as they come take less than a picture that waits as a whole.
+    room.run(&format!("{ask} -t 2 --aov all --max-memory 150M --stats s.json")).success();
+    let stats = json(&fs::read_to_string(room.path("s.json")).unwrap());
+    assert!(stats["memory"]["peak_bytes"].as_u64().is_some_and(|peak| peak < 150 << 20), "{stats}");
+    for words in [
+        " --max-memory 10M",
+        " --max-memory 60M --aov all",
+        " -t 2 --max-memory 150M --aov all --checkpoint c.part",
+        " -t 2 --max-memory 150M --aov all --cost",
+        " -t 2 --max-memory 150M --aov all --background transparent",
+    ] {
         let (_, err) = room.texts(&format!("{ask}{words}"), 5);
         assert!(err.contains("MiB of memory are needed, and the limit is"), "{words}: {err}");
     }

@@ -16,16 +16,16 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 
 use super::checkpoint::{Checkpoint, Saves};
-use super::memory;
+use super::memory::{self, Held};
 use super::source::{Shared, Ticket};
 use super::write::{Finished, Room, Writer, line};
 use super::{Event, Fresh, Job, JobError, Report, Shard, Sources, Watch, annotate, existing, ledger};
-use crate::film::Picture;
+use crate::film::{Picture, Window};
 use crate::output::exr::{Encoded, Packer};
 use crate::output::{self, EncodeError, Format, OutputError, aside};
 use crate::render::{RenderError, Renderer, Rendering, Task, moments, pool};
 use crate::scene::inputs::{Hashes, hex, sha256};
-use crate::scene::{Aov, Scene};
+use crate::scene::{Aov, Layers, Scene};
 
 /// Samples of a picture that is worth all threads: some tenths of a second.
 const LARGE: u64 = 1 << 22;
@@ -321,7 +321,7 @@ impl Batch<'_> {
         let stopped = || self.stopped();
         let saves = self.options.checkpoint.as_ref();
         let saves = saves.map(|to| Saves::new(to, format!("{scene_hash} {}", ledger::settings_hash(job))));
-        let packer = self.packer(job, scene, &task)?;
+        let packer = self.packer(job, scene, renderer.aovs(), &task)?;
         let pack = |rows: &Picture| packer.iter().for_each(|packer| packer.pack(rows));
         let mut unfinished = match &saves {
             None if packer.is_some() => task.begin_hollow(),
@@ -383,11 +383,20 @@ impl Batch<'_> {
         Ok(Some(Pictured { rendering, description, annotations, packed }))
     }
 
-    /// What packs the rows of an EXR as they are traced; `None` where the whole picture is needed in the end: to find what of
-    /// it is to be written, for what is told beside it, or for a checkpoint.
-    fn packer(&self, job: &Job, scene: &Scene, task: &Task) -> Result<Option<Packer>, JobError> {
-        let is_whole = is_trimmed(job, scene) || self.options.annotations || self.options.checkpoint.is_some();
-        if job.format != Format::Exr || is_whole || !task.passes() {
+    /// Whether rows of an EXR can be packed as they are traced; not where the whole picture is needed in the end: to find what
+    /// of it is to be written, for what is told beside it, for a checkpoint, or since what pixels cost is found for whole
+    /// blocks and sorted out in the end.
+    fn held(&self, job: &Job, scene: &Scene, layers: Layers) -> Held {
+        let is_kept = self.options.annotations || self.options.checkpoint.is_some() || layers.has(Aov::Cost);
+        match job.format == Format::Exr && !is_trimmed(job, scene) && !is_kept {
+            true => Held::Rows(self.threads, job.settings.options.exr),
+            false => Held::Whole,
+        }
+    }
+
+    /// What packs the rows of a picture that is not held as a whole.
+    fn packer(&self, job: &Job, scene: &Scene, layers: Layers, task: &Task) -> Result<Option<Packer>, JobError> {
+        if let Held::Whole = self.held(job, scene, layers) {
             return Ok(None);
         }
         let packer = Packer::new(&task.hollow(), job.settings.options.exr);
@@ -417,8 +426,10 @@ impl Batch<'_> {
     /// Refuses what would need more memory than was allowed, before it is read.
     fn allow(&self, job: &Job) -> Result<(), JobError> {
         let Some(limit) = self.options.max_memory else { return Ok(()) };
-        let pixels = job.settings.resolution.map_or(0, |(width, height)| u64::from(width) * u64::from(height));
-        let need = memory::forecast(&job.scene, job.frame()).saturating_add(memory::of_pixels(pixels, 0));
+        // What the scene says of its picture is not known yet.
+        let held = self.held(job, &Scene::default(), Layers::default());
+        let pixels = job.settings.resolution.map_or(0, |size| memory::of_pixels(Window::full(size), 0, held));
+        let need = memory::forecast(&job.scene, job.frame()).saturating_add(pixels);
         if need <= limit {
             // Once a scene file, before it is read.
             if lock(&self.forecast).insert(job.scene.clone()) {
@@ -433,7 +444,7 @@ impl Batch<'_> {
     fn room(&self, job: &Job, scene: &Scene, renderer: &Renderer<'_>) -> Result<(), JobError> {
         let window = renderer.window().map_err(|error| JobError::Render { path: Default::default(), error })?;
         let work = format!("a picture of {}x{} pixels", window.width(), window.height());
-        let pixels = memory::of_pixels(window.area() as u64, renderer.channel_count());
+        let pixels = memory::of_pixels(window, renderer.channel_count(), self.held(job, scene, renderer.aovs()));
         let moments = renderer.moment_count() as u64;
         let need = memory::to_build(scene).saturating_mul(moments).saturating_add(pixels);
         match self.options.max_memory {

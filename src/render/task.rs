@@ -116,14 +116,21 @@ impl<'s> Task<'s> {
         }
     }
 
+    /// Where a block lies.
+    pub(super) fn place(&self, block: usize) -> Window {
+        match &self.work {
+            Work::Blocks(_, blocks) => blocks[block].window,
+            Work::Rows(_) => {
+                let y0 = self.window.y0 + block as i32;
+                Window { y0, y1: y0 + 1, ..self.window }
+            }
+            Work::Tiles(tiles) => tiles.blocks()[block].window,
+        }
+    }
+
     /// Samples of a block: what it costs, roughly.
     pub fn samples(&self, block: usize) -> u64 {
-        let pixels = match &self.work {
-            Work::Blocks(_, blocks) => blocks[block].window.area(),
-            Work::Rows(_) => self.window.width(),
-            Work::Tiles(tiles) => tiles.blocks()[block].window.area(),
-        };
-        pixels as u64 * u64::from(self.spp)
+        self.place(block).area() as u64 * u64::from(self.spp)
     }
 
     /// Samples of all blocks.
@@ -260,11 +267,6 @@ impl<'s> Task<'s> {
     fn opened(&self, mut picture: Picture) -> Picture {
         self.asked().into_iter().for_each(|plan| plan.open(&mut picture));
         picture
-    }
-
-    /// Whether its rows can be passed on as they come: what pixels cost is found for whole blocks, and sorted out in the end.
-    pub fn passes(&self) -> bool {
-        self.asked().is_none_or(|plan| !plan.layers.has(Aov::Cost))
     }
 
     /// What is known before the first block.
