@@ -148,6 +148,11 @@ fn a_signal_shows_the_picture_so_far() {
     let picture = octray::output::read(&partial).unwrap();
     let seen = picture.pixels.iter().filter(|pixel| **pixel != [0.0; 4]).count();
     assert!(seen >= 1024 && seen < picture.pixels.len(), "{seen}");
+    // What is not rendered yet is as far away as what rays miss.
+    let depth = picture.channel("depth.Z").and_then(|channel| channel.samples.floats()).unwrap();
+    let unseen = picture.pixels.iter().zip(&*depth).filter(|(pixel, _)| **pixel == [0.0; 4]);
+    assert!(unseen.clone().count() > 1024 && unseen.clone().all(|(_, depth)| *depth == 1e10));
+    assert!(depth.iter().all(|depth| *depth > 0.0));
     assert!(!output.exists());
     assert_eq!(child.try_wait().unwrap(), None, "it goes on");
     assert!(signal("-TERM").success());

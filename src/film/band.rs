@@ -43,6 +43,12 @@ impl Picture {
         bands
     }
 
+    /// Puts a part with the same channels where it belongs.
+    pub fn put(&mut self, part: Picture) {
+        let samples: Vec<Samples> = part.channels.into_iter().map(|channel| channel.samples).collect();
+        self.band().put(part.window, &part.pixels, &samples);
+    }
+
     /// All of the picture as one band.
     pub fn band(&mut self) -> Band<'_> {
         let channels = self.channels.iter_mut().map(|channel| Strip::of(&mut channel.samples)).collect();

@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use super::adaptive::{Reached, Spent};
 use super::block::EDGE;
-use super::layers::{Numbers, Seen};
+use super::layers::{Numbers, Seen, missed};
 use super::passing::Passing;
 use super::{IdNames, Rendering, Stats, Task, Traced};
 use crate::film::{Band, Channel, Cryptomatte, Picture, Window};
@@ -202,8 +202,11 @@ impl<'s> Gathering<'_, 's> {
         let tally = lock(self.tally).clone();
         let picture = match &self.place {
             Place::Picture(bands) => {
-                let mut picture = self.task.blank();
+                let (mut picture, hollow) = (self.task.blank(), self.task.hollow());
                 bands.iter().for_each(|band| lock(band).copy_to(&mut picture));
+                // Nor is there anything of blocks that came since the tally was taken.
+                let left = (0..self.task.blocks()).filter(|block| !tally.done[*block]);
+                left.for_each(|block| picture.put(missed(&hollow, self.task.place(block))));
                 picture
             }
             Place::On(..) => self.task.hollow(),

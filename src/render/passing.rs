@@ -7,7 +7,8 @@ use std::mem::replace;
 use std::sync::{Arc, Mutex};
 
 use super::gather::lock;
-use crate::film::{Channel, Picture, Samples, Window};
+use super::layers::missed;
+use crate::film::{Picture, Samples, Window};
 
 /// The bands of a picture, from the top.
 pub(super) struct Passing {
@@ -77,16 +78,13 @@ impl Passing {
         Some(Whole { band, rows })
     }
 
-    /// Copies of all rows that were not taken yet, band by band: black where no block is there.
+    /// Copies of all rows that were not taken yet, band by band: nothing is seen where no block is there.
     pub fn waiting(&self) -> impl Iterator<Item = Picture> {
         (0..self.bands.len()).filter_map(|band| match &*lock(&self.bands[band]) {
-            Passage::Empty => Some(self.blank(self.window(band))),
+            Passage::Empty => Some(missed(&self.picture, self.window(band))),
             Passage::Open(picture, there) => {
-                let mut copy = self.blank(picture.window);
-                for part in there.iter().filter_map(|window| picture.crop(*window)) {
-                    let channels: Vec<Samples> = part.channels.into_iter().map(|channel| channel.samples).collect();
-                    copy.band().put(part.window, &part.pixels, &channels);
-                }
+                let mut copy = missed(&self.picture, picture.window);
+                there.iter().filter_map(|window| picture.crop(*window)).for_each(|part| copy.put(part));
                 Some(copy)
             }
             Passage::Whole(picture) => Some(Picture::clone(picture)),
@@ -106,21 +104,15 @@ impl Passing {
         let found = spare.iter().position(|picture| picture.window.area() == window.area());
         match found {
             Some(place) => Picture { window, ..spare.swap_remove(place) },
-            None => self.blank(window),
+            None => missed(&self.picture, window),
         }
-    }
-
-    fn blank(&self, window: Window) -> Picture {
-        let zeros = |channel: &Channel| channel.samples.kind().zeros(window.area());
-        let channel = |channel: &Channel| Channel { name: channel.name.clone(), samples: zeros(channel) };
-        let channels = self.picture.channels.iter().map(channel).collect();
-        Picture { channels, ..Picture::new(self.picture.display, window) }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::Channel;
 
     /// Bands are passed on once, each when its last block came, and put together they are the picture; what waits is what
     /// was put and not passed on.
@@ -141,7 +133,7 @@ mod tests {
                 let whole = passing.put(part.window, &part.pixels, &channels);
                 whole.into_iter().for_each(|rows| passing.pass(rows, |rows| lock(&passed).push(rows.clone())));
                 put.push(part.window);
-                let mut made = passing.blank(window);
+                let mut made = missed(&passing.picture, window);
                 let waiting: Vec<Picture> = passing.waiting().collect();
                 for rows in lock(&passed).iter().chain(&waiting) {
                     let channels: Vec<Samples> = rows.channels.iter().map(|channel| channel.samples.clone()).collect();

@@ -26,7 +26,7 @@ pub(super) use self::tape::LayerTape;
 
 use super::adaptive::Effort;
 use super::{Renderer, shutter};
-use crate::film::{Channel, Cryptomatte, Picture, SampleKind, Samples};
+use crate::film::{Channel, Cryptomatte, Picture, SampleKind, Samples, Window};
 use crate::scene::{Aov, Camera, Layers, Objects, Scene, carried};
 
 /// The depth of a miss: finite, so that filters do not spread infinity.
@@ -34,6 +34,24 @@ pub(super) const MISS_DEPTH: f32 = 1e10;
 
 /// The margin of a miss, and the most that one is: finite as well.
 pub(super) const MOST_MARGIN: f64 = 1e10;
+
+/// Pixels of a picture that no ray was sent through, as if each had met nothing and nothing were behind.
+pub(super) fn missed(hollow: &Picture, window: Window) -> Picture {
+    let channel = |channel: &Channel| {
+        let mut samples = channel.samples.kind().zeros(window.area());
+        let miss = match channel.layer() {
+            "depth" => MISS_DEPTH,
+            "margin" => MOST_MARGIN as f32,
+            _ => 0.0,
+        };
+        if let (true, Samples::Float(samples)) = (miss > 0.0, &mut samples) {
+            samples.fill(miss);
+        }
+        Channel { name: channel.name.clone(), samples }
+    };
+    let channels = hollow.channels.iter().map(channel).collect();
+    Picture { channels, ..Picture::new(hollow.display, window) }
+}
 
 /// Keys that each Cryptomatte shows.
 pub(super) type Seen = [BTreeSet<u32>; Aov::CRYPTOMATTES.len()];
