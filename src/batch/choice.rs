@@ -55,6 +55,13 @@ impl Tile {
     }
 }
 
+/// "tile 2 of 4x3".
+impl std::fmt::Display for Tile {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "tile {} of {}x{}", self.index, self.columns, self.rows)
+    }
+}
+
 /// What is added on each side.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Overscan {

@@ -73,6 +73,10 @@ pub struct Settings {
     pub uncertified: bool,
     /// How samples are stored.
     pub options: output::Options,
+    /// Who owns the picture, for an EXR.
+    pub owner: Option<String>,
+    /// Any words, for an EXR.
+    pub comments: Option<String>,
     /// Leave out of the file what differs from run to run.
     pub undated: bool,
 }
@@ -151,12 +155,14 @@ impl Job {
         scene_hash: Option<String>,
         shard: Option<String>,
     ) -> Description {
+        let parts: Vec<String> =
+            shard.into_iter().chain(self.settings.windows.tile.map(|tile| tile.to_string())).collect();
         let run = description::Run {
             date: SystemTime::now(),
             seconds: stats.plan_seconds + stats.build_seconds + stats.trace_seconds,
             threads: u32::try_from(stats.threads).unwrap_or(u32::MAX),
             rays: Some(stats.rays.rays.iter().sum::<u64>().to_string()),
-            shard,
+            shard: (!parts.is_empty()).then(|| parts.join(", ")),
         };
         Description {
             scene: self.scene.file_name().map(|name| name.to_string_lossy().into_owned()),
@@ -167,6 +173,8 @@ impl Job {
             seed: Some(renderer.pattern()),
             file_stem: output::stem(&self.output),
             frame: i32::try_from(self.frame()).ok(),
+            owner: self.settings.owner.clone(),
+            comments: self.settings.comments.clone(),
             run: (!self.settings.undated).then_some(run),
             ..Description::default()
         }

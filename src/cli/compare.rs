@@ -1,9 +1,9 @@
 //! `octray compare`: how far apart two pictures are.
 
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use octray::film::Picture;
+use octray::film::{Picture, Window};
 use octray::measure::{Channel, Comparison, Spread, compare, heatmap};
 use octray::output::{self, Contents, Format, png};
 
@@ -26,6 +26,7 @@ Examples:
         RMSE, relative MSE and differences are of scene-linear values, PSNR and SSIM of what a display shows. \
         The largest difference and the share of different pixels are of all channels that both pictures have (ids, and \
         those of Cryptomattes, differ by 1 or not at all), the RMSE, PSNR and SSIM of colour and alpha. \
+        Pixels lie where the windows of their files say; a PNG, which says none, on an EXR of as many pixels. \
         Ends with 1 where a limit is not kept."
 )]
 pub struct Args {
@@ -79,19 +80,56 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
     Ok(if broken.is_empty() { Exit::Done } else { Exit::No })
 }
 
-/// Both pictures. Where transparent edges were left out of one of them, their colours as they were rendered.
-fn read(args: &Args, run: &Run) -> Result<[Picture; 2], Failure> {
-    let found = [output::read_all(&args.a)?, output::read_all(&args.b)?];
-    if found[0].picture.window == found[1].picture.window {
-        return Ok(found.map(|found| found.picture));
+/// One of the pictures.
+struct Side {
+    picture: Picture,
+    /// The window that was rendered, where transparent edges were left out.
+    rendered: Option<Window>,
+    /// Where the frame of an EXR begins.
+    origin: Option<(i32, i32)>,
+}
+
+impl Side {
+    fn read(path: &Path) -> Result<Side, Failure> {
+        let Contents { picture, attributes, .. } = output::read_all(path)?;
+        let rendered = attributes.as_ref().and_then(|attributes| attributes.rendered(&picture));
+        Ok(Side { rendered, origin: attributes.map(|attributes| attributes.origin()), picture })
     }
-    Ok(found.map(|Contents { picture, attributes, .. }| {
-        let Some(window) = attributes.and_then(|attributes| attributes.rendered(&picture)) else { return picture };
-        if !picture.channels.is_empty() {
+
+    /// Colours as they were rendered.
+    fn untrimmed(&mut self) {
+        if let Some(window) = self.rendered {
+            self.picture = self.picture.colors_in(window);
+        }
+    }
+
+    /// A PNG says no window: it lies where the other picture has as many pixels.
+    fn lay_on(&mut self, other: &Picture) {
+        let size = |window: Window| (window.width(), window.height());
+        if self.origin.is_none() && size(self.picture.window) == size(other.window) {
+            (self.picture.display, self.picture.window) = (other.display, other.window);
+        }
+    }
+}
+
+/// Both pictures, their pixels where the files say. Where transparent edges were left out of one of them, their colours as
+/// they were rendered.
+fn read(args: &Args, run: &Run) -> Result<[Picture; 2], Failure> {
+    let [mut a, mut b] = [Side::read(&args.a)?, Side::read(&args.b)?];
+    if let (Some(from), Some(to)) = (a.origin, b.origin) {
+        let moved = |window: Window| window.moved(to.0.saturating_sub(from.0), to.1.saturating_sub(from.1));
+        (b.picture.window, b.rendered) = (moved(b.picture.window), b.rendered.map(moved));
+    }
+    if a.picture.window != b.picture.window {
+        if [&a, &b].into_iter().any(|side| side.rendered.is_some() && !side.picture.channels.is_empty()) {
             run.console.warn("layers are not compared: transparent edges were left out");
         }
-        picture.colors_in(window)
-    }))
+        a.untrimmed();
+        b.untrimmed();
+    }
+    a.lay_on(&b.picture);
+    b.lay_on(&a.picture);
+    Ok([a.picture, b.picture])
 }
 
 impl Args {

@@ -101,7 +101,9 @@ fn convert_picture(args: &Args, run: &Run) -> Result<Exit, Failure> {
         Some(window) => found.picture.colors_in(window),
         None => found.picture,
     };
-    let description = Description { scene, kept: found.attributes, rendered, ..Description::default() };
-    pictures::write(&picture, &target, options, &description, run)?;
+    let (owner, comments) = (args.depth.owner.clone(), args.depth.comments.clone());
+    let kept = found.attributes;
+    let description = Description { scene, kept, rendered, owner, comments, ..Description::default() };
+    pictures::write((&args.input, &picture), &target, options, description, run)?;
     Ok(Exit::Done)
 }

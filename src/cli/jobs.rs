@@ -52,7 +52,7 @@ pub struct Running {
     #[arg(long, value_enum, value_name = "FORM")]
     progress: Option<Lines>,
     /// Show a single picture in the tev viewer while it is rendered, such as at 127.0.0.1:14158
-    #[arg(long, value_name = "HOST:PORT")]
+    #[arg(long, value_name = "HOST:PORT", value_parser = host)]
     tev: Option<String>,
     #[command(flatten)]
     stats: StatsFile,
@@ -71,6 +71,13 @@ fn shard(text: &str) -> Result<Shard, String> {
 fn percent(text: &str) -> Result<f64, String> {
     let number = text.trim_end_matches('%').parse().ok().filter(|percent| *percent > 0.0 && *percent <= 100.0);
     number.ok_or_else(|| "should be a number above 0, up to 100".to_owned())
+}
+
+/// `127.0.0.1:14158`, `localhost:14158`, `[::1]:14158`.
+fn host(text: &str) -> Result<String, String> {
+    let port = text.rsplit_once(':').filter(|(name, _)| !name.is_empty()).and_then(|(_, port)| port.parse().ok());
+    let found = port.is_some_and(|port: u16| port > 0).then(|| text.to_owned());
+    found.ok_or_else(|| "should be HOST:PORT, such as 127.0.0.1:14158".to_owned())
 }
 
 /// `60s`, `10m`, `1h`, `2.5`.
@@ -186,6 +193,11 @@ fn check(jobs: &[Job], running: &Running, run: &Run) -> Result<Vec<PathBuf>, Fai
     let mut inputs: Vec<PathBuf> = jobs.iter().map(|job| job.scene.clone()).collect();
     inputs.sort_unstable();
     inputs.dedup();
+    if let Some(job) = jobs.iter().find(|job| job.format == Format::Png && !job.settings.layers.aovs.is_empty()) {
+        let text =
+            "a PNG holds the colours alone, and the layers of --aov are not written: give a name that ends in .exr";
+        run.console.warn(&format!("{job}: {text}"));
+    }
     let mut outputs: HashMap<&Path, usize> = HashMap::new();
     let mut folders: Vec<&Path> = Vec::new();
     for (index, job) in jobs.iter().enumerate() {
@@ -298,6 +310,14 @@ pub fn target(path: &Path, inputs: &[&Path], many: bool, run: &Run) -> Result<Ta
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn viewers_have_a_host_and_a_port() {
+        assert!(["127.0.0.1:14158", "viewer:1", "[::1]:14158"].iter().all(|text| host(text).is_ok()));
+        for text in ["", "nonsense", "host:", ":14158", "host:0", "host:65536", "host:port"] {
+            assert!(host(text).is_err_and(|reason| reason.contains("127.0.0.1:14158")), "{text}");
+        }
+    }
 
     #[test]
     fn sizes_and_shards_are_read_or_explained() {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use octray::film::Picture;
-use octray::output::{self, Contents, Description};
+use octray::output::{self, Attributes, Contents, Description};
 
 use super::Run;
 use super::exit::{Exit, Failure};
@@ -15,7 +15,7 @@ Examples:
   octray merge parts/*.exr -o full.exr --compression zip";
 
 /// What parts of one frame have in common, beside windows and layers.
-const COMMON: [&str; 4] = ["render/sceneHash", "render/seed", "render/spp", "render/frame"];
+const COMMON: [&str; 5] = ["render/sceneHash", "render/seed", "render/spp", "render/frame", "render/settings"];
 
 /// Arguments of `octray merge`.
 #[derive(Debug, clap::Args)]
@@ -23,7 +23,7 @@ const COMMON: [&str; 4] = ["render/sceneHash", "render/seed", "render/spp", "ren
     after_help = EXAMPLES,
     long_about = "Join crops of one frame to the frame\n\n\
         Every pixel has to be in a part, and where parts overlap they have to agree to the bit. Scene hash, seed, \
-        samples and frame have to be the same. The result is, to the byte, what one render with --no-date writes; without \
+        samples, frame and all other settings that say more than which pixels have to be the same. The result is, to the byte, what one render with --no-date writes; without \
         --color its colours are those of the first part."
 )]
 pub struct Args {
@@ -69,8 +69,9 @@ pub fn run(args: &Args, run: &Run) -> Result<Exit, Failure> {
     // As a render of the whole frame does: with a background there is nothing to trim.
     let rendered = whole.trim();
     let scene = kept.as_ref().and_then(|kept| kept.text("render/scene"));
-    let description = Description { scene, kept, rendered, ..Description::default() };
-    pictures::write(&whole, &target, options, &description, run)?;
+    let (owner, comments) = (args.depth.owner.clone(), args.depth.comments.clone());
+    let description = Description { scene, kept, rendered, owner, comments, ..Description::default() };
+    pictures::write((&args.parts[0], &whole), &target, options, description, run)?;
     Ok(Exit::Done)
 }
 
@@ -87,6 +88,15 @@ fn check(path: &Path, part: &Contents) -> Result<(), Failure> {
 
 /// Refuses parts that are not of one render.
 fn compare(paths: &[PathBuf], parts: &[Contents]) -> Result<(), Failure> {
+    let origin = |part: &Contents| part.attributes.as_ref().map_or((0, 0), Attributes::origin);
+    let (x0, y0) = origin(&parts[0]);
+    for (path, part) in paths.iter().zip(parts) {
+        let (x, y) = origin(part);
+        if (x, y) != (x0, y0) {
+            let text = format!("its frame begins at {x},{y}, that of {} at {x0},{y0}", paths[0].display());
+            return Err(Failure::new(Exit::Input, text).of(path));
+        }
+    }
     for name in COMMON {
         let first = text(&parts[0], name);
         for (path, part) in paths.iter().zip(parts).skip(1) {

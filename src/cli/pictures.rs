@@ -33,6 +33,12 @@ pub struct Depth {
     /// EXR: Cryptomatte manifests in .json files beside the picture, not only those that are too long for its header
     #[arg(long)]
     crypto_sidecar: bool,
+    /// EXR: who owns the picture, for its header
+    #[arg(long, value_name = "TEXT")]
+    pub owner: Option<String>,
+    /// EXR: any words, for its header
+    #[arg(long, value_name = "TEXT")]
+    pub comments: Option<String>,
     /// PNG: bits a sample, 8 (usual) or 16
     #[arg(long, value_name = "8|16", value_parser = ["8", "16"])]
     bits: Option<String>,
@@ -147,6 +153,8 @@ impl Depth {
             (self.multipart, "--multipart"),
             (self.depth_name.is_some(), "--depth-name"),
             (self.crypto_sidecar, "--crypto-sidecar"),
+            (self.owner.is_some(), "--owner"),
+            (self.comments.is_some(), "--comments"),
         ])
     }
 
@@ -215,33 +223,35 @@ pub fn ready(
         options.exr.given = options.exr.color;
         return Ok(files.into_iter().map(|(_, found)| found).collect());
     }
-    let in_rec709 = |(path, found): (&Path, Contents)| {
-        let none = || Failure::new(Exit::Input, "is damaged: its chromaticities span no colours").of(path);
-        found.in_rec709().ok_or_else(none)
-    };
-    files.into_iter().map(in_rec709).collect()
+    files.into_iter().map(|(path, found)| Ok(found.in_rec709(path)?)).collect()
 }
 
-/// Writes a picture whole, or not at all, and says what the format could not hold.
+/// Writes the picture of a file whole, or not at all, and says what the format could not hold. What cannot be encoded is the
+/// file's fault.
 pub fn write(
-    picture: &Picture,
+    (source, picture): (&Path, &Picture),
     target: &Target,
     options: Options,
-    description: &Description,
+    description: Description,
     run: &Run,
 ) -> Result<(), Failure> {
     let name = match target {
         Target::File(path, _) => output::stem(path),
         Target::Stdout => None,
     };
-    let description = Description { file_stem: name, ..description.clone() };
-    put(output::encode(target.format(), picture, options, &description), target, run)
+    let description = Description { file_stem: name, ..description };
+    let encoded = output::encode(target.format(), picture, options, &description);
+    let fault = |error| Failure::new(Exit::Input, format!("cannot be written as {target}: {error}")).of(source);
+    save(encoded.map_err(fault)?, target, run)
 }
 
 /// Writes an encoded picture, and says what the format could not hold.
 pub fn put(encoded: Result<Encoded, EncodeError>, target: &Target, run: &Run) -> Result<(), Failure> {
-    let encoded =
-        encoded.map_err(|error| Failure::new(Exit::Output, format!("{target}: cannot be encoded: {error}")))?;
+    let fault = |error| Failure::new(Exit::Output, format!("{target}: cannot be encoded: {error}"));
+    save(encoded.map_err(fault)?, target, run)
+}
+
+fn save(encoded: Encoded, target: &Target, run: &Run) -> Result<(), Failure> {
     match target {
         Target::File(path, _) => {
             for file in &encoded.beside {

@@ -127,6 +127,8 @@ impl Settings {
             skips: self.skips(),
             uncertified: self.no_certify,
             options: Default::default(),
+            owner: self.depth.owner.clone(),
+            comments: self.depth.comments.clone(),
             undated: self.no_date || std::env::var_os("SOURCE_DATE_EPOCH").is_some(),
         };
         let (output, format) = (PathBuf::new(), Format::Exr);

@@ -32,6 +32,13 @@ impl Window {
         Window { x0: less(self.x0, x), y0: less(self.y0, y), x1: more(self.x1, x), y1: more(self.y1, y) }
     }
 
+    /// So many pixels further right and down.
+    pub fn moved(&self, x: i32, y: i32) -> Window {
+        let Window { x0, y0, x1, y1 } = *self;
+        let to = i32::saturating_add;
+        Window { x0: to(x0, x), y0: to(y0, y), x1: to(x1, x), y1: to(y1, y) }
+    }
+
     /// Pixels from left to right.
     pub fn width(&self) -> usize {
         extent(self.x0, self.x1)

@@ -29,9 +29,9 @@ pub struct Description {
     pub rendered: Option<Window>,
     /// Frames per second as a fraction; readers assume 24/1 where it is absent, and so does `None` here.
     pub frames_per_second: Option<(i32, u32)>,
-    /// Who owns the picture.
+    /// Who owns the picture: `owner`.
     pub owner: Option<String>,
-    /// Any words.
+    /// Any words: `comments`.
     pub comments: Option<String>,
     /// The file's own name without extension; manifests beside it are named after it.
     pub file_stem: Option<String>,
@@ -52,7 +52,7 @@ pub struct Run {
     pub threads: u32,
     /// Rays traced, as text: `render/rays`.
     pub rays: Option<String>,
-    /// Which shard of which number: `render/shard`.
+    /// Which shard of which number, "2/8", and which tile, "tile 2 of 4x3": `render/shard`.
     pub shard: Option<String>,
 }
 

@@ -41,11 +41,19 @@ impl Attributes {
         }
     }
 
+    /// Where the display window begins: there is (0, 0) of the picture.
+    pub fn origin(&self) -> (i32, i32) {
+        let Vec2(x, y) = self.shared.display_window.position;
+        (x, y)
+    }
+
     /// The window that was rendered, where that is said to be larger than the picture's.
     pub fn rendered(&self, picture: &Picture) -> Option<Window> {
         let AttributeValue::IntegerBounds(found) = self.own.other.get(&text(RENDERED))? else { return None };
         let far = |from: i32, size: usize| from.checked_add(i32::try_from(size).ok()?);
         let (Vec2(x0, y0), Vec2(width, height)) = (found.position, found.size);
+        let origin = self.origin();
+        let (x0, y0) = (x0.checked_sub(origin.0)?, y0.checked_sub(origin.1)?);
         let window = Window { x0, y0, x1: far(x0, width)?, y1: far(y0, height)? };
         (window.holds(&picture.window) && window.area() <= MOST_PIXELS).then_some(window)
     }
@@ -103,13 +111,18 @@ fn image_attributes(
 ) -> Result<ImageAttributes, EncodeError> {
     let (width, height) = picture.display;
     let size = |size: u32| usize::try_from(size).map_err(EncodeError::new);
-    let frame = IntegerBounds::from_dimensions((size(width)?, size(height)?));
+    let frame = IntegerBounds::new(origin(description), (size(width)?, size(height)?));
     let kept = description.kept.as_ref().map(|kept| kept.shared.clone());
     let mut attributes = kept.unwrap_or_else(|| ImageAttributes::new(frame));
     attributes.display_window = frame;
     attributes.other.retain(|name, _| is_sound(name.as_slice()));
     attributes.chromaticities = Some(chromaticities(storage.color.primaries()));
     Ok(attributes)
+}
+
+/// Where the display window begins: at (0, 0), unless the file that the picture was read from says otherwise.
+fn origin(description: &Description) -> (i32, i32) {
+    description.kept.as_ref().map_or((0, 0), Attributes::origin)
 }
 
 fn chromaticities(primaries: Primaries) -> Chromaticities {
@@ -122,7 +135,11 @@ fn layer_attributes(picture: &Picture, description: &Description) -> LayerAttrib
         Some(kept) => kept.own.clone(),
         None => LayerAttributes { frames_per_second: Some((24, 1)), ..LayerAttributes::default() },
     };
-    attributes.layer_position = Vec2(picture.window.x0, picture.window.y0);
+    let origin = origin(description);
+    // Added up these are what was read, or what the check of headers refuses.
+    let moved = |x: i32, y: i32| (x.saturating_add(origin.0), y.saturating_add(origin.1));
+    let (x0, y0) = moved(picture.window.x0, picture.window.y0);
+    attributes.layer_position = Vec2(x0, y0);
     attributes.software_name = Some(text(&description::software()));
     let words = |slot: &mut Option<Text>, words: &Option<String>| {
         if let Some(words) = words {
@@ -152,11 +169,11 @@ fn layer_attributes(picture: &Picture, description: &Description) -> LayerAttrib
         .other
         .retain(|name, value| is_sound(name.as_slice()) && !is_about_samples(name.as_slice()) && !is_shared(value));
     attributes.other.extend(own_attributes(description).map(|(name, value)| (text(name), value)));
+    if let Some(window) = description.rendered {
+        let bounds = IntegerBounds::new(moved(window.x0, window.y0), (window.width(), window.height()));
+        attributes.other.insert(text(RENDERED), AttributeValue::IntegerBounds(bounds));
+    }
     attributes
-}
-
-fn bounds(window: Window) -> AttributeValue {
-    AttributeValue::IntegerBounds(IntegerBounds::new((window.x0, window.y0), (window.width(), window.height())))
 }
 
 /// Whether an attribute beside the standard ones can have this name.
@@ -178,7 +195,6 @@ fn own_attributes(description: &Description) -> impl Iterator<Item = (&'static s
         ("samplesPerPixel", description.spp.map(count)),
         ("render/seed", description.seed.map(|seed| AttributeValue::Text(text(&seed.to_string())))),
         ("render/frame", description.frame.map(AttributeValue::I32)),
-        (RENDERED, description.rendered.map(bounds)),
         ("render/seconds", seconds.clone()),
         ("renderTimeSeconds", seconds),
         ("render/threads", run.map(|run| count(run.threads))),

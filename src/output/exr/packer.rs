@@ -122,8 +122,10 @@ impl Packer {
         MetaData::validate(&headers, true).map_err(EncodeError::new)?;
         let hash = hash(&picture, &parts, &packed);
         headers[0].own_attributes.other.insert(text(PIXEL_HASH), AttributeValue::Text(text(&hash)));
+        // Rows were counted from a display window at (0, 0).
+        let above = headers[0].own_attributes.layer_position.y() - picture.window.y0;
         let losses = packed.values().fold(Losses::default(), |losses, packed| losses.and(packed.losses));
-        let bytes = file(headers, packed)?;
+        let bytes = file(headers, packed, above)?;
         Ok(Encoded { bytes, losses, beside: manifests.into_iter().filter_map(manifest::Manifest::beside).collect() })
     }
 
@@ -226,10 +228,16 @@ fn hash(picture: &Picture, parts: &[Part], packed: &Chunks) -> String {
     hash.finish()
 }
 
-fn file(headers: Vec<Header>, packed: Chunks) -> Result<Vec<u8>, EncodeError> {
+/// All of a file; the rows of chunks lie so much lower in it than they say.
+fn file(headers: Vec<Header>, packed: Chunks, above: i32) -> Result<Vec<u8>, EncodeError> {
     let mut bytes = Cursor::new(Vec::new());
     let written = exr::block::write(&mut bytes, headers.into_iter().collect(), true, |_, writer| {
-        packed.into_iter().try_for_each(|((_, index), packed)| writer.write_chunk(index, packed.chunk))
+        packed.into_iter().try_for_each(|((_, index), Packed { mut chunk, .. })| {
+            if let CompressedBlock::ScanLine(lines) = &mut chunk.compressed_block {
+                lines.y_coordinate += above;
+            }
+            writer.write_chunk(index, chunk)
+        })
     });
     written.map_err(EncodeError::new)?;
     let mut bytes = bytes.into_inner();

@@ -82,13 +82,18 @@ pub struct Contents {
 }
 
 impl Contents {
-    /// With all colours linear Rec. 709; `None` where the primaries span no colours.
-    pub fn in_rec709(mut self) -> Option<Self> {
+    /// With all colours linear Rec. 709; `path` is the file that they are of.
+    ///
+    /// # Errors
+    /// [`ReadError::Damaged`], where the primaries span no colours.
+    pub fn in_rec709(mut self, path: &Path) -> Result<Self, ReadError> {
         if let Some(primaries) = self.primaries.take() {
-            let matrix = primaries.matrix_to(Primaries::REC709)?;
+            let fault =
+                || ReadError::Damaged { path: path.into(), reason: "its chromaticities span no colours".into() };
+            let matrix = primaries.matrix_to(Primaries::REC709).ok_or_else(fault)?;
             self.picture = color::converted(&self.picture, matrix).into_owned();
         }
-        Some(self)
+        Ok(self)
     }
 }
 
@@ -115,16 +120,13 @@ pub fn read(path: &Path) -> Result<Picture, ReadError> {
 /// file states, and what there is none of is black; all other channels of all flat parts are layers, with the name
 /// of their part before theirs where they have none. Types are half, float or uint, compressions all but HTJ2K;
 /// layers that cover other pixels than the colour are cut or filled up with 0. Where the display window begins
-/// elsewhere than at (0, 0), all windows move. PNG: any depth and colour type, by the sRGB curve whatever its
+/// elsewhere than at (0, 0), all windows move ([`Attributes::origin`] says from where). PNG: any depth and colour type, by the sRGB curve whatever its
 /// chunks say, alpha multiplied in; its window is the full frame.
 ///
 /// # Errors
 /// Any [`ReadError`]; each names the path and the cause.
 pub fn read_all(path: &Path) -> Result<Contents, ReadError> {
-    let contents = read_as_stored(path)?;
-    contents
-        .in_rec709()
-        .ok_or_else(|| ReadError::Damaged { path: path.into(), reason: "its chromaticities span no colours".into() })
+    read_as_stored(path)?.in_rec709(path)
 }
 
 /// The same in the primaries of the file.
