@@ -160,6 +160,8 @@ pub struct Taken<'a> {
     pub pixels: &'a [[u32; LANES]],
     /// Squares of their distances from the centres of their pixels, pixels.
     pub distances: &'a [[f64; LANES]; PACKETS],
+    /// Packets that are one sample of each of 4 x 2 pixels, row by row, a bit each.
+    pub squares: u32,
 }
 
 /// Samples of some tiles and what came of them.

@@ -157,7 +157,7 @@ impl Block {
                 && coverage.is_none_or(|coverage| coverage.sees_packet(x, y))
             {
                 batch.sees = true;
-                let pattern = |x, y| if draws { rays.pattern(x, y) } else { PixelPattern::default() };
+                let pattern = draws.then_some(|x, y| rays.pattern(x, y));
                 batch.push_pixels((x, y), pattern, range.start, (first, frame.width()));
                 if batch.count == WAVE {
                     work.tile(&mut batch);
@@ -297,6 +297,8 @@ struct Batch {
     traced: usize,
     /// Squares of the waiting samples' distances from the centres of their pixels, where a record wants them.
     distances: [[f64; LANES]; PACKETS],
+    /// Waiting packets that are one sample of each of 4 x 2 pixels, a bit each.
+    squares: u32,
     /// Whether the samples that wait may see anything but the background.
     sees: bool,
 }
@@ -316,9 +318,9 @@ impl<R: Record> Work<'_, '_, R> {
             self.room.seeds.extend(batch.samples);
         }
         if R::SURFACES {
-            let Batch { samples, count, pixels, traced, distances, .. } = &*batch;
+            let Batch { samples, count, pixels, traced, distances, squares, .. } = &*batch;
             let pixels = &pixels[traced / LANES..];
-            self.record.taken(&Taken { count: *count, samples, pixels, distances });
+            self.record.taken(&Taken { count: *count, samples, pixels, distances, squares: *squares });
         }
         self.direct.trace_camera(batch.sees, &mut self.room, self.record);
         if R::SURFACES {
@@ -327,7 +329,7 @@ impl<R: Record> Work<'_, '_, R> {
         self.tiles += 1;
         self.background_tiles += u64::from(self.room.rays.hits[RayKind::Camera as usize] == met);
         batch.traced += batch.count;
-        batch.count = 0;
+        (batch.count, batch.squares) = (0, 0);
         if batch.traced == BATCH * WAVE {
             self.finish(batch);
         }
@@ -381,12 +383,12 @@ impl Batch {
     }
 
     /// Adds one sample of each of the eight pixels of a packet, whose first one is at `place`, and at `first` among the
-    /// pixels of a frame of this width. No packet may be begun.
+    /// pixels of a frame of this width. No packet may be begun; without `pattern` nothing is drawn.
     #[inline(always)]
     fn push_pixels(
         &mut self,
         (x, y): (i32, i32),
-        pattern: impl Fn(i32, i32) -> PixelPattern,
+        pattern: Option<impl Fn(i32, i32) -> PixelPattern>,
         sample: u32,
         (first, width): (usize, usize),
     ) {
@@ -394,10 +396,13 @@ impl Batch {
         samples.x = PACKET.map(|(right, _)| x + right);
         samples.y = PACKET.map(|(_, down)| y + down);
         samples.index = [sample; LANES];
-        for lane in 0..LANES {
-            samples.set_pattern(lane, pattern(samples.x[lane], samples.y[lane]));
+        if let Some(pattern) = pattern {
+            for lane in 0..LANES {
+                samples.set_pattern(lane, pattern(samples.x[lane], samples.y[lane]));
+            }
         }
         self.pixels.push(PACKET.map(|(right, down)| (first + down as usize * width + right as usize) as u32));
+        self.squares |= 1 << (self.count / LANES);
         self.count += LANES;
     }
 
@@ -446,8 +451,8 @@ impl Batch {
     }
 }
 
-/// The pixels of a packet as a Z curve meets them: 4 x 2.
-pub const PACKET: [(i32, i32); LANES] = [(0, 0), (1, 0), (0, 1), (1, 1), (2, 0), (3, 0), (2, 1), (3, 1)];
+/// The pixels of a packet, row by row: 4 x 2, which a Z curve meets one after another.
+const PACKET: [(i32, i32); LANES] = [(0, 0), (1, 0), (2, 0), (3, 0), (0, 1), (1, 1), (2, 1), (3, 1)];
 
 /// Where the first pixel of a packet is in a frame, if all of the packet lies in the window.
 fn whole_packet(window: Window, frame: Window, (x, y): (i32, i32)) -> Option<usize> {

@@ -49,9 +49,9 @@ impl Places<'_> {
     #[inline(always)]
     pub fn set<T: Copy>(&self, column: &mut [T], values: &[T; LANES]) {
         if let Some(below) = self.below {
-            let (first, [a, b, c, d, e, f, g, h]) = (self.pixels[0] as usize, *values);
-            column[first..first + 4].copy_from_slice(&[a, b, e, f]);
-            column[below..below + 4].copy_from_slice(&[c, d, g, h]);
+            let first = self.pixels[0] as usize;
+            column[first..first + 4].copy_from_slice(&values[..4]);
+            column[below..below + 4].copy_from_slice(&values[4..]);
         } else if self.lanes == (1 << LANES) - 1 {
             (0..LANES).for_each(|i| column[self.pixels[i] as usize] = values[i]);
         } else {

@@ -9,7 +9,6 @@ use crate::integrate::{Lit, RayKind, Record, Samples8, Seen, Silent, Spent, Summ
 use crate::lanes::{Float8, LANES, Mask8, Ray, Vec3x8, bits, first_least};
 use crate::plan::Owner;
 use crate::reference;
-use crate::render::block::PACKET;
 use crate::render::{Frame, shutter};
 use crate::scene::Aov;
 use crate::shade::attributes;
@@ -25,8 +24,8 @@ pub(in crate::render) struct LayerTape<'a, 's> {
     sums: Sums,
     /// Whether all packets are of one pixel each, and hold the same samples in any block.
     whole: bool,
-    /// Where each pixel has a single sample, the places of a packet's 4 x 2 pixels, counted from the first.
-    places: Option<[u32; LANES]>,
+    /// Whether each pixel has a single sample.
+    single: bool,
     tile: [Packet; PACKETS],
 }
 
@@ -64,10 +63,8 @@ impl<'a, 's> LayerTape<'a, 's> {
         // To a noise level a pixel takes what it needs.
         let spp = frames[0].noise.is_none().then_some(frames[0].spp);
         let whole = frames.len() == 1 && spp.is_some_and(|spp| (spp as usize).is_multiple_of(LANES));
-        let width = block.width() as u32;
-        let places = (spp == Some(1)).then(|| PACKET.map(|(right, down)| right as u32 + down as u32 * width));
         let sums = Sums::new(plan, block.area(), spp);
-        LayerTape { frames, plan, axis, sums, whole, places, tile: Default::default() }
+        LayerTape { frames, plan, axis, sums, whole, single: spp == Some(1), tile: Default::default() }
     }
 
     /// What comes next is seen at this moment.
@@ -185,10 +182,7 @@ impl Record for LayerTape<'_, '_> {
             let count = LANES.min(taken.count - p * LANES);
             let nearest = self.sums.nearest().choose(pixels, distances, count);
             let (before, rest) = self.tile.split_at_mut(p);
-            let below = self
-                .places
-                .filter(|places| count == LANES && pixels.map(|pixel| pixel.wrapping_sub(pixels[0])) == *places);
-            let below = below.map(|places| (pixels[0] + places[2]) as usize);
+            let below = (self.single && taken.squares >> p & 1 == 1).then(|| pixels[LANES / 2] as usize);
             rest[0] = Packet { pixels: *pixels, index: samples.index, nearest, below };
             let goes_on = before.last().is_some_and(|packet| packet.pixels[LANES - 1] == pixels[0]);
             if goes_on && nearest & rest[0].lanes_of(pixels[0]) != 0 {
