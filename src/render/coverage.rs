@@ -1,4 +1,5 @@
-//! Which parts of the picture can see anything but the background: the boxes of the tree on the screen.
+//! Which parts of the picture can see anything but the background: the boxes of the tree and of what is in its leaves, on
+//! the screen.
 
 use glam::DVec3;
 
@@ -28,12 +29,12 @@ impl Coverage {
         let size = [display.0, display.1].map(|pixels| (pixels as usize).div_ceil(CELL as usize));
         let mut coverage = Coverage { width: size[0], cells: vec![false; size[0] * size[1]] };
         let mut looked = 0;
-        let is_bounded = tree.outline(|min, max, is_leaf| {
+        let is_bounded = tree.outline(|min, max, is_last| {
             looked += 1;
             let Some(cells) = screen.cells(min.as_dvec3(), max.as_dvec3(), size) else { return false };
             let [x0, y0, x1, y1] = cells;
             let is_small = x1 - x0 <= SMALL && y1 - y0 <= SMALL;
-            if is_leaf || is_small || looked > MOST_BOXES {
+            if is_last || is_small || looked > MOST_BOXES {
                 coverage.rows(cells).for_each(|row| row.fill(true));
                 return false;
             }
@@ -164,6 +165,15 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Both stand in one leaf.
+    #[test]
+    fn between_balls_there_is_nothing() {
+        let lens = Lens::Pinhole { vfov: 90.0 };
+        let coverage = coverage(lens, &[([-8.0, 0.0, 0.0], 1.0), ([8.0, 0.0, 0.0], 1.0)]).expect("bounded");
+        assert!([18, 82].iter().all(|x| coverage.sees(*x, 40)));
+        assert!((35..65).all(|x| !coverage.sees(x, 40)));
     }
 
     #[test]
