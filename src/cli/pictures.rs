@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use octray::film::Picture;
 use octray::output::{
     self, Bits, Coding, Compression, Contents, Description, Display, EncodeError, Encoded, Format, Losses, Options,
-    OutputError, Storage, ToneMap, aside,
+    OutputError, Storage, ToneMap, Transfer, aside,
 };
 
 use super::Run;
@@ -54,6 +54,9 @@ pub struct Depth {
     /// PNG: round 8-bit samples to the nearest instead of dithering them by a fixed pattern
     #[arg(long)]
     no_dither: bool,
+    /// PNG: high dynamic range, 16 bits by the curve of Rec. 2100 (PQ), light of 1 at 203 cd/m2
+    #[arg(long, conflicts_with_all = ["bits", "white", "tonemap", "no_dither"])]
+    hdr_png: bool,
 }
 
 /// Tone maps by their names.
@@ -166,6 +169,7 @@ impl Depth {
             (self.white.is_some(), "--white"),
             (self.tonemap.is_some(), "--tonemap"),
             (self.no_dither, "--no-dither"),
+            (self.hdr_png, "--hdr-png"),
         ])
     }
 
@@ -204,7 +208,8 @@ impl Depth {
             tone_map: self.tonemap.map_or(ToneMap::None, ToneMap::from),
         };
         let bits = if self.bits.as_deref() == Some("16") { Bits::Sixteen } else { Bits::Eight };
-        Coding { bits, display, dither: !self.no_dither }
+        let transfer = if self.hdr_png { Transfer::Pq } else { Transfer::Srgb };
+        Coding { bits, display, dither: !self.no_dither, transfer }
     }
 }
 

@@ -19,6 +19,11 @@ impl Primaries {
         xy: [DVec2::new(0.64, 0.33), DVec2::new(0.30, 0.60), DVec2::new(0.15, 0.06), DVec2::new(0.3127, 0.3290)],
     };
 
+    /// Rec. ITU-R BT.2020 with D65, which Rec. 2100 shares.
+    pub const REC2020: Primaries = Primaries {
+        xy: [DVec2::new(0.708, 0.292), DVec2::new(0.170, 0.797), DVec2::new(0.131, 0.046), DVec2::new(0.3127, 0.3290)],
+    };
+
     /// ACEScg: AP1 with the white of ACES, near D60.
     ///
     /// Source: Academy of Motion Picture Arts and Sciences, "ACEScg: a working space for CGI render and

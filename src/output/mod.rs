@@ -2,7 +2,7 @@
 //!
 //! This room answers for what a file holds, byte by byte: [`exr`] and [`png`] encode a picture,
 //! [`aside`] puts bytes under a name without ever leaving half a file there, [`mod@read`] brings a file
-//! back as a picture, [`description`] says where a picture comes from, [`srgb`] is the display curve.
+//! back as a picture, [`description`] says where a picture comes from, [`srgb`] is the display curve, and `pq` that of displays of high dynamic range.
 //! What the pixels mean is settled before: scene-linear, premultiplied ([`Picture`]).
 
 pub mod aside;
@@ -12,6 +12,7 @@ mod display;
 pub mod exr;
 mod pixel_hash;
 pub mod png;
+mod pq;
 pub mod read;
 pub mod srgb;
 mod view;
@@ -23,7 +24,7 @@ use thiserror::Error;
 pub use self::description::{Description, Run};
 pub use self::display::{Display, ToneMap};
 pub use self::exr::{Attributes, Beside, ColorSpace, Compression, Encoded, Storage};
-pub use self::png::{Bits, Coding};
+pub use self::png::{Bits, Coding, Transfer};
 pub use self::read::{Contents, HashPair, ReadError, read, read_all, read_as_stored};
 use crate::film::Picture;
 

@@ -1,11 +1,12 @@
-//! PNG files: what a display shows of a picture, by the exact sRGB curve, with straight alpha.
+//! PNG files: what a display shows of a picture, by the exact sRGB curve or that of Rec. 2100, with straight alpha.
 //!
 //! The file holds the pixels of the picture's window. Colour is divided by alpha, goes through exposure, white point
 //! and tone map ([`Display`]) and then the curve, is clamped to 0..1 and becomes a code: the nearest of 65,536, or one
 //! of the two of 256 around it by a fixed table of 8 x 8 places (dither), the nearest without it. A picture that is
 //! opaque in halves has no alpha channel, so that a picture gives the same file whether it went through a half-float
 //! EXR or not, but for a code's difference.
-//! The `sRGB` chunk says which curve it was, `gAMA` and `cHRM` say it to readers that do not know that one.
+//! The `sRGB` chunk says which curve it was, `gAMA` and `cHRM` say it to readers that do not know that one; `cICP` says it
+//! of high dynamic range, which has 65,536 codes and no dither.
 
 use half::f16;
 use png::{BitDepth, ColorType, Compression, Encoder, ScaledFloat, SourceChromaticities, SrgbRenderingIntent};
@@ -13,8 +14,7 @@ use rayon::prelude::*;
 
 use super::color::Primaries;
 use super::description::{self, Description};
-use super::display::Shown;
-use super::{Display, EncodeError, Losses, srgb};
+use super::{Display, EncodeError, Losses, pq, srgb};
 use crate::film::Picture;
 
 /// How a picture becomes the codes of a PNG.
@@ -26,12 +26,25 @@ pub struct Coding {
     pub display: Display,
     /// Whether 8-bit codes are dithered.
     pub dither: bool,
+    /// From light to codes.
+    pub transfer: Transfer,
+}
+
+/// The curve between light and codes, and the primaries that go with it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Transfer {
+    /// IEC 61966-2-1: light above 1 is cut off.
+    #[default]
+    Srgb,
+    /// Rec. ITU-R BT.2100 with the perceptual quantiser, 16 bits whatever [`Bits`] say: light of 1 is 203 cd/m2, what is
+    /// above 49 is cut off.
+    Pq,
 }
 
 /// Eight bits, dithered, as it is.
 impl Default for Coding {
     fn default() -> Self {
-        Coding { bits: Bits::Eight, display: Display::default(), dither: true }
+        Coding { bits: Bits::Eight, display: Display::default(), dither: true, transfer: Transfer::Srgb }
     }
 }
 
@@ -63,23 +76,25 @@ pub struct Raster {
 pub fn encode(picture: &Picture, coding: Coding, description: &Description) -> Result<(Vec<u8>, Losses), EncodeError> {
     EncodeError::unless_whole(picture)?;
     let shown = coding.display.prepare();
-    let nearest = |a: f32, codes: f32| (srgb::unit(a) * codes).round();
-    let (color, losses, samples) = match (coding.bits, coding.dither) {
-        (Bits::Eight, true) => {
-            samples(picture, &shown, |v, x, y| [srgb::to_u8_dithered(v, x, y)], |a| [nearest(a, 255.0) as u8])
+    let light = |rgb| shown.light(rgb);
+    let byte = |a: f32| [(srgb::unit(a) * 255.0).round() as u8];
+    let word = |a: f32| ((srgb::unit(a) * 65535.0).round() as u16).to_be_bytes();
+    let (color, losses, samples) = match (coding.transfer, coding.bits, coding.dither) {
+        (Transfer::Srgb, Bits::Eight, true) => samples(picture, light, |v, x, y| [srgb::to_u8_dithered(v, x, y)], byte),
+        (Transfer::Srgb, Bits::Eight, false) => samples(picture, light, |v, _, _| [srgb::to_u8(v)], byte),
+        (Transfer::Srgb, Bits::Sixteen, _) => samples(picture, light, |v, _, _| srgb::to_u16(v).to_be_bytes(), word),
+        (Transfer::Pq, ..) => {
+            let shares = |rgb| pq::shares(shown.light(rgb));
+            samples(picture, shares, |v, _, _| pq::to_u16(v).to_be_bytes(), word)
         }
-        (Bits::Eight, false) => samples(picture, &shown, |v, _, _| [srgb::to_u8(v)], |a| [nearest(a, 255.0) as u8]),
-        (Bits::Sixteen, _) => samples(
-            picture,
-            &shown,
-            |v, _, _| srgb::to_u16(v).to_be_bytes(),
-            |a| (nearest(a, 65535.0) as u16).to_be_bytes(),
-        ),
     };
     let size = |size: usize| u32::try_from(size).map_err(EncodeError::new);
     let size = (size(picture.window.width())?, size(picture.window.height())?);
-    let depth = if coding.bits == Bits::Eight { BitDepth::Eight } else { BitDepth::Sixteen };
-    Ok((file(size, color, depth, description.scene.as_deref(), &samples)?, losses))
+    let depth = match (coding.transfer, coding.bits) {
+        (Transfer::Srgb, Bits::Eight) => BitDepth::Eight,
+        (Transfer::Pq, _) | (_, Bits::Sixteen) => BitDepth::Sixteen,
+    };
+    Ok((file(size, (color, depth, coding.transfer), description.scene.as_deref(), &samples)?, losses))
 }
 
 /// The bytes of a PNG file that shows a raster.
@@ -88,13 +103,13 @@ pub fn encode(picture: &Picture, coding: Coding, description: &Description) -> R
 /// A raster that is empty, or whose list of pixels is not as long as its size says.
 pub fn encode_raster(raster: &Raster, title: &str) -> Result<Vec<u8>, EncodeError> {
     let size = (raster.width, raster.height);
-    file(size, ColorType::Rgb, BitDepth::Eight, Some(title), raster.pixels.as_flattened())
+    file(size, (ColorType::Rgb, BitDepth::Eight, Transfer::Srgb), Some(title), raster.pixels.as_flattened())
 }
 
 /// Codes of all pixels, with alpha unless the picture is opaque.
 fn samples<const BYTES: usize>(
     picture: &Picture,
-    shown: &Shown,
+    light: impl Fn([f32; 3]) -> [f32; 3] + Sync,
     color_code: impl Fn(f32, i32, i32) -> [u8; BYTES] + Sync,
     alpha_code: impl Fn(f32) -> [u8; BYTES] + Sync,
 ) -> (ColorType, Losses, Vec<u8>) {
@@ -108,8 +123,8 @@ fn samples<const BYTES: usize>(
         for ((x, pixel), codes) in (window.x0..).zip(pixels).zip(codes.chunks_exact_mut(BYTES * channels)) {
             let invisible = !opaque && alpha_code(f16::from_f32(pixel[3]).to_f32()) == [0; BYTES];
             let color = if invisible { [0.0; 3] } else { straight(pixel) };
-            let light = shown.light(color.map(|value| losses.finite(value)));
-            for (value, code) in light.into_iter().zip(codes.chunks_exact_mut(BYTES)) {
+            let shown = light(color.map(|value| losses.finite(value)));
+            for (value, code) in shown.into_iter().zip(codes.chunks_exact_mut(BYTES)) {
                 losses.bounded(value);
                 code.copy_from_slice(&color_code(value, x, window.y0 + y as i32));
             }
@@ -161,8 +176,7 @@ impl Losses {
 
 fn file(
     (width, height): (u32, u32),
-    color: ColorType,
-    depth: BitDepth,
+    (color, depth, transfer): (ColorType, BitDepth, Transfer),
     title: Option<&str>,
     samples: &[u8],
 ) -> Result<Vec<u8>, EncodeError> {
@@ -171,16 +185,21 @@ fn file(
     encoder.set_color(color);
     encoder.set_depth(depth);
     encoder.set_compression(Compression::Fast);
-    encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
-    encoder.set_source_gamma(ScaledFloat::from_scaled(45455));
-    let [red, green, blue, white] = Primaries::REC709.xy.map(|xy| (xy.x as f32, xy.y as f32));
-    encoder.set_source_chromaticities(SourceChromaticities::new(white, red, green, blue));
+    if transfer == Transfer::Srgb {
+        encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
+        encoder.set_source_gamma(ScaledFloat::from_scaled(45455));
+        let [red, green, blue, white] = Primaries::REC709.xy.map(|xy| (xy.x as f32, xy.y as f32));
+        encoder.set_source_chromaticities(SourceChromaticities::new(white, red, green, blue));
+    }
     encoder.add_text_chunk("Software".into(), description::software()).map_err(EncodeError::new)?;
     if let Some(title) = title {
         // International text: a scene's name need not be Latin-1.
         encoder.add_itxt_chunk("Title".into(), title.replace('\0', " ")).map_err(EncodeError::new)?;
     }
     let mut writer = encoder.write_header().map_err(EncodeError::new)?;
+    if transfer == Transfer::Pq {
+        writer.write_chunk(png::chunk::cICP, &pq::CODE_POINTS).map_err(EncodeError::new)?;
+    }
     writer.write_image_data(samples).map_err(EncodeError::new)?;
     writer.finish().map_err(EncodeError::new)?;
     Ok(bytes)
@@ -196,6 +215,7 @@ mod tests {
         bits: Bits::Eight,
         display: Display { exposure: 0.0, white: None, tone_map: ToneMap::None },
         dither: false,
+        transfer: Transfer::Srgb,
     };
 
     fn row(pixels: &[[f32; 4]]) -> Picture {
@@ -266,6 +286,29 @@ mod tests {
                 assert!(off.contains(&1));
             }
         }
+    }
+
+    /// The file says so, and is read as the light that it was made of.
+    #[test]
+    fn high_dynamic_range_keeps_what_is_brighter_than_white() {
+        let picture =
+            row(&[[1.0, 1.0, 1.0, 1.0], [12.0, 0.5, 0.0, 1.0], [60.0, 60.0, 60.0, 1.0], [0.5, 0.0, 1.0, 0.5]]);
+        let coding = Coding { transfer: Transfer::Pq, ..Coding::default() };
+        let (bytes, losses) = encode(&picture, coding, &Description::default()).unwrap();
+        assert_eq!(losses, Losses { clamped: 3, dropped: 0 });
+        let reader = png::Decoder::new(std::io::Cursor::new(&bytes)).read_info().unwrap();
+        let points = reader.info().coding_independent_code_points.unwrap();
+        assert_eq!((points.color_primaries, points.transfer_function), (9, 16));
+        assert_eq!((reader.info().bit_depth, reader.info().srgb), (BitDepth::Sixteen, None));
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("hdr.png");
+        std::fs::write(&path, &bytes).unwrap();
+        let back = crate::output::read(&path).unwrap();
+        for (i, (back, was)) in back.pixels.iter().zip(picture.pixels.iter()).enumerate().filter(|(i, _)| *i != 2) {
+            let off = back.iter().zip(was).map(|(a, b)| (a - b).abs());
+            assert!(off.fold(0.0, f32::max) < 2e-3, "{i}: {back:?} {was:?}");
+        }
+        assert!(back.pixels[2].iter().take(3).all(|light| (light - 49.26).abs() < 0.01), "{:?}", back.pixels[2]);
     }
 
     #[test]

@@ -120,8 +120,9 @@ pub fn read(path: &Path) -> Result<Picture, ReadError> {
 /// file states, and what there is none of is black; all other channels of all flat parts are layers, with the name
 /// of their part before theirs where they have none. Types are half, float or uint, compressions all but HTJ2K;
 /// layers that cover other pixels than the colour are cut or filled up with 0. Where the display window begins
-/// elsewhere than at (0, 0), all windows move ([`Attributes::origin`] says from where). PNG: any depth and colour type, by the sRGB curve whatever its
-/// chunks say, alpha multiplied in; its window is the full frame.
+/// elsewhere than at (0, 0), all windows move ([`Attributes::origin`] says from where). PNG: any depth and colour type, by
+/// the curve of Rec. 2100 (PQ) where its `cICP` chunk says so and the sRGB curve whatever else its chunks say, alpha
+/// multiplied in; its window is the full frame.
 ///
 /// # Errors
 /// Any [`ReadError`]; each names the path and the cause.
