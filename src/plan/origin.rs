@@ -11,8 +11,11 @@ use crate::scene::{Camera, Lens, Scene, Shape, bounding_balls};
 
 /// A pixel that covers less than this share of the distance is seen through a long lens: some thousand roundings.
 const NARROW: f64 = 1e-4;
-/// A sphere is a speck where the eye is so many times its radius away: f32 rounds its normals by as many roundings.
+/// A sphere is a speck where the eye is so many times its radius away, counted along the normal: f32 rounds normals by as
+/// many roundings, and by more the flatter a ray meets the sphere.
 pub const SPECK: f64 = 128.0;
+/// Rays that meet a sphere more flatly are few: the cosine.
+const FLAT: f64 = 1.0 / 8.0;
 /// A scene is far where the eye is away from its middle so many times its radius.
 const FAR: f64 = 8.0;
 
@@ -46,10 +49,10 @@ pub fn origin(scene: &Scene, camera: &Camera, rows: u32) -> (DVec3, bool) {
     (points.min_by(|a, b| off(*a).total_cmp(&off(*b))).unwrap_or(eye), true)
 }
 
-/// Whether any sphere is a speck seen from the eye.
+/// Whether any sphere is a speck seen from the eye, be it where rays meet it flatly.
 pub fn has_specks(scene: &Scene, eye: DVec3) -> bool {
     scene.primitives().any(|primitive| match &*primitive.shape {
-        Shape::Sphere(sphere) => (sphere.center - eye).length_squared() > (SPECK * sphere.radius).powi(2),
+        Shape::Sphere(sphere) => (sphere.center - eye).length_squared() > (FLAT * SPECK * sphere.radius).powi(2),
         Shape::Plane(_) | Shape::Disk(_) | Shape::Polygon(_) => false,
         Shape::Box(_) | Shape::Cylinder(_) | Shape::Cone(_) => false,
     })

@@ -215,7 +215,8 @@ impl Stores {
                 radius[lane] = self.spheres.block(row.row() / LANES).1.as_array()[row.row() % LANES];
             }
         }
-        let specks = Mask8::gt(t * rays.dir.length(), Float8::from(radius) * float8(SPECK as f32));
+        let flatness = rays.dir.dot(rays.dir) / surface.normal.dot(rays.dir).abs();
+        let specks = Mask8::gt(t * flatness, Float8::from(radius) * float8(SPECK as f32));
         if specks.any() {
             let mut parts = [None; LANES];
             for lane in specks.lanes() {

@@ -5,10 +5,10 @@ use glam::DVec3;
 use super::brute::{packet_against_rows, ray_against_rows};
 use super::{Ray64, RowRef, Stores};
 use crate::fixtures::{Dice, MAKERS, Maker, exact, gray, object, ray, turn};
-use crate::lanes::{Float8, LANES, Mask8, Ray, RayPacket, Vec3x8};
+use crate::lanes::{ExactPacket, Float8, LANES, Mask8, Ray, RayPacket, Vec3x8};
 use crate::plan::{Kind, Plan};
 use crate::reference::{Reference, Verdict};
-use crate::scene::{Scene, Shape, Visible};
+use crate::scene::{Scene, Shape, Sphere, Visible};
 
 /// One block of eight and one of three and padding.
 const SHAPES: usize = 11;
@@ -267,6 +267,38 @@ fn normals_of_tiny_bodies_are_unit() {
                 judged += 1;
             }
             assert!(judged > 20, "{name}: {judged}");
+        }
+    }
+}
+
+/// Spheres of 60 radii away are no specks, unless a ray meets them flatly: there f32 is off by several times the bound.
+#[test]
+fn flat_hits_of_spheres_have_the_normals_of_f64() {
+    let (center, radius, mut dice) = (DVec3::new(0.7, -1.1, -2.0), 0.04, Dice(7));
+    let objects = vec![object(Shape::Sphere(Sphere { center, radius }), 0)];
+    let scene = Scene { objects, materials: vec![gray(0.5)], ..Scene::default() };
+    let plan = Plan::new(&scene, DVec3::ZERO);
+    let stores = Stores::new(plan.parts(), None, &plan.visible);
+    let row = RowRef::new(Kind::Sphere, 0);
+    for _ in 0..300 {
+        let mut rays = [exact(&ray(DVec3::ZERO, DVec3::X)); LANES];
+        for ray in &mut rays {
+            let aside = dice.direction().cross(center).normalize() * radius * dice.between(0.9, 0.9999);
+            ray.dir = (center + aside).normalize();
+        }
+        let axes = |of: fn(DVec3) -> f64| rays.map(|ray| of(ray.dir));
+        let before = ExactPacket { origin: [[0.0; LANES]; 3], dir: [axes(|d| d.x), axes(|d| d.y), axes(|d| d.z)] };
+        let lines = rays.map(|ray| Ray64 { origin: ray.origin, dir: ray.dir, t_min: 0.0, t_max: f64::INFINITY });
+        let t = Float8::from(lines.map(|line| stores.decide(row, &line).expect("a hit") as f32));
+        let dir = Vec3x8::from_fn(|i| rays[i].dir.as_vec3().to_array());
+        let packet = RayPacket::new(Vec3x8::ZERO, dir, t, Mask8::from_bits(0xff));
+        let hits = Float8::splat(row.to_lane());
+        let (mut surface, _) = stores.surface::<false>(hits, &packet, t, Some(&before));
+        stores.sharpen_specks(0xff, &hits.to_array(), (&packet, &before), &mut surface);
+        for (i, line) in lines.iter().enumerate() {
+            let want = stores.refine(row, line, f64::from(t.to_array()[i])).expect("a row").normal;
+            let off = (DVec3::from_array(surface.normal.lane(i).map(f64::from)) - want).length();
+            assert!(off < 2e-5, "{off:e}: {line:?}");
         }
     }
 }
