@@ -23,7 +23,8 @@ const COMMON: [&str; 5] = ["render/sceneHash", "render/seed", "render/spp", "ren
     after_help = EXAMPLES,
     long_about = "Join crops of one frame to the frame\n\n\
         Every pixel has to be in a part, and where parts overlap they have to agree to the bit. Scene hash, seed, \
-        samples, frame and all other settings that say more than which pixels have to be the same. The result is, to the byte, what one render with --no-date writes; without \
+        samples, frame and all other settings that say more than which pixels have to be the same. The result is, to \
+        the byte, what one render with --no-date writes; without \
         --color its colours are those of the first part."
 )]
 pub struct Args {
