@@ -271,7 +271,7 @@ fn normals_of_tiny_bodies_are_unit() {
     }
 }
 
-/// Spheres of 60 radii away are no specks, unless a ray meets them flatly: there f32 is off by several times the bound.
+/// Spheres of 60 radii away are no specks, unless a ray meets them flatly: there f32 alone is off by 4e-5.
 #[test]
 fn flat_hits_of_spheres_have_the_normals_of_f64() {
     let (center, radius, mut dice) = (DVec3::new(0.7, -1.1, -2.0), 0.04, Dice(7));
@@ -289,7 +289,9 @@ fn flat_hits_of_spheres_have_the_normals_of_f64() {
         let axes = |of: fn(DVec3) -> f64| rays.map(|ray| of(ray.dir));
         let before = ExactPacket { origin: [[0.0; LANES]; 3], dir: [axes(|d| d.x), axes(|d| d.y), axes(|d| d.z)] };
         let lines = rays.map(|ray| Ray64 { origin: ray.origin, dir: ray.dir, t_min: 0.0, t_max: f64::INFINITY });
-        let t = Float8::from(lines.map(|line| stores.decide(row, &line).expect("a hit") as f32));
+        // As the kernel has them: what it is off by grows with the slant.
+        let t = rays.map(|line| ray_against_rows(&stores, Kind::Sphere, &ray(line.origin, line.dir), false)[0]);
+        let t = Float8::from(t.map(|t| t.expect("a hit")));
         let dir = Vec3x8::from_fn(|i| rays[i].dir.as_vec3().to_array());
         let packet = RayPacket::new(Vec3x8::ZERO, dir, t, Mask8::from_bits(0xff));
         let hits = Float8::splat(row.to_lane());
@@ -298,7 +300,7 @@ fn flat_hits_of_spheres_have_the_normals_of_f64() {
         for (i, line) in lines.iter().enumerate() {
             let want = stores.refine(row, line, f64::from(t.to_array()[i])).expect("a row").normal;
             let off = (DVec3::from_array(surface.normal.lane(i).map(f64::from)) - want).length();
-            assert!(off < 2e-5, "{off:e}: {line:?}");
+            assert!(off < 1e-6, "{off:e}: {line:?}");
         }
     }
 }
