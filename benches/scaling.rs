@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use glam::DVec3;
-use octray::measure::bench::{BenchSettings, Question, RaySet, Supply, bench};
+use octray::measure::bench::{BenchSettings, Question, RaySet, Supply, Throughput, bench};
 use octray::measure::plot::{Chart, Series};
 use octray::scene::*;
 use octray::{Renderer, Tracer};
@@ -34,11 +34,10 @@ fn main() {
 
 fn by_spheres(most: f64) -> Chart {
     let counts = (4..).map(|step| 10f64.powf(f64::from(step) / 2.0)).take_while(|count| *count <= most * 1.01);
-    println!(
-        "| spheres | build ns/sphere | tree and columns bytes/sphere | camera ns/ray | shadow ns/ray | bounce ns/ray |"
-    );
-    println!("|---|---|---|---|---|---|");
-    let mut lines: Vec<Vec<(f64, f64)>> = vec![Vec::new(); 1 + KINDS.len()];
+    print!("| spheres | build ns/sphere | tree and columns bytes/sphere |");
+    KINDS.iter().for_each(|(name, ..)| print!(" {name} ns/ray | tests/ray |"));
+    println!("\n|---|---|---|{}", "---|---|".repeat(KINDS.len()));
+    let mut lines: Vec<Vec<(f64, f64)>> = vec![Vec::new(); 1 + 2 * KINDS.len()];
     for count in counts {
         let count = count.round();
         let scene = spheres(count as usize, 256);
@@ -49,21 +48,23 @@ fn by_spheres(most: f64) -> Chart {
         drop(tracer);
         let settings = BenchSettings { sets: RaySet::ALL.to_vec(), threads: 1, repeats: 5, resolution: None };
         let figures = bench(&scene, &settings, &mut |_| ()).expect("something to meet");
-        let cost = |(_, set, question): &(&str, RaySet, Question)| {
-            let is = |f: &&octray::measure::bench::Throughput| {
-                (f.set, f.question, f.supply) == (*set, *question, Supply::Stored)
-            };
-            let figure = figures.iter().find(is).expect("was measured");
-            1e3 / figure.mrays_per_cpu_s.unwrap_or(figure.mrays_per_s)
-        };
-        let costs: Vec<f64> = KINDS.iter().map(cost).collect();
-        lines[0].push((count, build * 1e9 / count));
-        costs.iter().zip(&mut lines[1..]).for_each(|(cost, line)| line.push((count, *cost)));
         let (each, size) = (build * 1e9 / count, bytes as f64 / count);
-        println!("| {count:.0} | {each:.0} | {size:.0} | {:.1} | {:.1} | {:.1} |", costs[0], costs[1], costs[2]);
+        print!("| {count:.0} | {each:.0} | {size:.0} |");
+        lines[0].push((count, each));
+        for (k, (_, set, question)) in KINDS.iter().enumerate() {
+            let is = |f: &&Throughput| (f.set, f.question, f.supply) == (*set, *question, Supply::Stored);
+            let figure = figures.iter().find(is).expect("was measured");
+            let cost = 1e3 / figure.mrays_per_cpu_s.unwrap_or(figure.mrays_per_s);
+            let tests = (figure.tests.boxes + figure.tests.kinds.iter().sum::<u64>()) as f64 / figure.rays as f64;
+            print!(" {cost:.1} | {tests:.1} |");
+            lines[1 + 2 * k].push((count, cost));
+            lines[2 + 2 * k].push((count, tests));
+        }
+        println!();
     }
-    let names = std::iter::once("build, a sphere").chain(KINDS.iter().map(|kind| kind.0));
-    chart("Time against spheres", "spheres", "ns per sphere or ray", names.zip(lines))
+    let kinds = KINDS.iter().flat_map(|(name, ..)| [(*name).to_owned(), format!("{name}, tests")]);
+    let names = std::iter::once("build, a sphere".to_owned()).chain(kinds);
+    chart("Time and tests against spheres", "spheres", "ns per sphere or ray, tests per ray", names.zip(lines))
 }
 
 fn by_pixels() -> Chart {
@@ -82,11 +83,11 @@ fn by_pixels() -> Chart {
         times.iter().zip(&mut lines).for_each(|(time, line)| line.push((pixels, *time)));
         println!("| {pixels:.0} | {:.4} | {:.4} |", times[0], times[1]);
     }
-    let names = ["1,000 spheres", "100,000 spheres"].into_iter();
+    let names = ["1,000 spheres", "100,000 spheres"].into_iter().map(str::to_owned);
     chart("Time against pixels (tracing, 1 spp, 1 thread)", "pixels", "seconds", names.zip(lines))
 }
 
-fn chart<'a>(title: &str, x: &str, y: &str, lines: impl Iterator<Item = (&'a str, Vec<(f64, f64)>)>) -> Chart {
+fn chart(title: &str, x: &str, y: &str, lines: impl Iterator<Item = (String, Vec<(f64, f64)>)>) -> Chart {
     let mut chart = Chart::new(title, x, y);
     for (name, points) in lines {
         let slope = slope(&points);
