@@ -59,7 +59,8 @@ impl Bundle {
         let units: [Vec3x8; PACKETS] = std::array::from_fn(|p| rays[p].dir * rays[p].inv_dd.sqrt());
         let far = by_packet(|p| rays[p].t_max * rays[p].dir.length(), Float8::fast_max);
         let far = Mask8::gt(far, Float8::ZERO).select(far.mul_add(slack, far), far);
-        let dirs = intervals(|p| units[p]).map(|axis| axis.widened(axis.size() * slack));
+        let dirs = intervals(|p| units[p]);
+        let dirs = axes(|k| dirs[k].widened(dirs[k].size() * slack));
         let bundle = Bundle { origins: origins(rays, common), dirs, start: 0.0, far };
         if common.is_some() {
             return bundle;
@@ -73,8 +74,8 @@ impl Bundle {
     /// The same rays from their ends back: shadow rays of a light.
     fn backwards(&self, rays: &[RayPacket; PACKETS]) -> Self {
         let ends = intervals(|p| rays[p].dir.mul_add(rays[p].t_max, rays[p].origin));
-        let moved = [0, 1, 2].map(|k| self.far.mul_add(self.dirs[k].size(), self.origins[k].size()));
-        let back = self.dirs.map(|Interval { low, high }| Interval { low: -high, high: -low });
+        let moved = axes(|k| self.far.mul_add(self.dirs[k].size(), self.origins[k].size()));
+        let back = axes(|k| Interval { low: -self.dirs[k].high, high: -self.dirs[k].low });
         Bundle { origins: widened(&ends, &moved), dirs: back, ..*self }
     }
 
@@ -117,7 +118,7 @@ impl Bundle {
         if self.start < 0.0 {
             return 0;
         }
-        let [x, y, z] = self.dirs.map(|axis| axis.size());
+        let [x, y, z] = axes(|k| self.dirs[k].size());
         let reach = x.fast_max(y).fast_max(z);
         let narrow = Mask8::le(widest(&self.dirs), reach * float8(spread));
         (narrow & Mask8::le(widest(&self.origins), float8(SPREAD * scene))).bits()
@@ -132,10 +133,10 @@ impl Bundle {
     pub fn beam(&self, live: u32) -> Beam {
         let (mut back, mut split) = ([false; 3], [false; 3]);
         // Origins of camera rays may have been rounded.
-        let origins = self.origins.map(|axis| axis.widened(axis.size() * float8(4.0 * UNIT_ROUNDOFF)));
+        let origins = widened(&self.origins, &axes(|k| self.origins[k].size()));
         let mut beam = Beam {
-            origin_near: origins.map(|axis| axis.high),
-            origin_far: origins.map(|axis| axis.low),
+            origin_near: axes(|k| origins[k].high),
+            origin_far: axes(|k| origins[k].low),
             inv_near: [Float8::ZERO; 3],
             inv_far: [Float8::ZERO; 3],
             near: near_planes(back),
@@ -143,7 +144,7 @@ impl Bundle {
             start: float8(self.start),
         };
         let live = Mask8::from_bits(live);
-        let [x, y, z] = self.dirs.map(|axis| axis.size());
+        let [x, y, z] = axes(|k| self.dirs[k].size());
         let least = least_direction(x.fast_max(y).fast_max(z));
         for k in 0..3 {
             let Interval { low, high } = self.dirs[k];
@@ -180,26 +181,32 @@ impl Interval {
     }
 }
 
+/// `f` of each axis, in line: `map` of an array of lanes is a call.
+#[inline(always)]
+fn axes<T>(f: impl FnMut(usize) -> T) -> [T; 3] {
+    std::array::from_fn(f)
+}
+
 fn origins(rays: &[RayPacket; PACKETS], common: Option<[f32; 3]>) -> [Interval; 3] {
     match common {
-        Some(origin) => origin.map(|x| Interval { low: float8(x), high: float8(x) }),
+        Some(origin) => axes(|k| Interval { low: float8(origin[k]), high: float8(origin[k]) }),
         None => intervals(|p| rays[p].origin),
     }
 }
 
 /// By what rounding moves points that are made of coordinates of this size.
 fn widened(all: &[Interval; 3], sizes: &[Float8; 3]) -> [Interval; 3] {
-    [0, 1, 2].map(|k| all[k].widened(sizes[k] * float8(4.0 * UNIT_ROUNDOFF)))
+    axes(|k| all[k].widened(sizes[k] * float8(4.0 * UNIT_ROUNDOFF)))
 }
 
 fn merged(all: &[Interval; 3], live: u32) -> [Interval; 3] {
     let live = Mask8::from_bits(live);
-    [0, 1, 2].map(|k| all[k].merged(live))
+    axes(|k| all[k].merged(live))
 }
 
 /// The greatest width of an axis.
 fn widest(all: &[Interval; 3]) -> Float8 {
-    let [x, y, z] = [0, 1, 2].map(|k| all[k].high - all[k].low);
+    let [x, y, z] = axes(|k| all[k].high - all[k].low);
     x.fast_max(y).fast_max(z)
 }
 

@@ -82,17 +82,17 @@ impl AreaLight {
     pub fn draw(&self, point: Vec3x8, bits: [[u32; LANES]; 2]) -> Drawn {
         match &self.points {
             Points::Sphere { center, radius } => {
-                self.draw_cap(point, Vec3x8::splat(single(*center)), *radius as f32, bits.map(unit))
+                self.draw_cap(point, Vec3x8::splat(single(*center)), *radius as f32, units(bits))
             }
             Points::Disk { center, axes, normal, area } => {
-                let [u, v] = bits.map(unit);
+                let [u, v] = units(bits);
                 let (sin, cos) = (v * float8(TAU as f32)).sin_cos();
                 let r = u.sqrt();
                 let place = Vec3x8::splat(axes[1]).mul_add(r * sin, Vec3x8::splat(*center));
                 self.draw_place(point, Vec3x8::splat(axes[0]).mul_add(r * cos, place), *normal, *area)
             }
             Points::Parallelogram { corner, edges, normal, area } => {
-                let [u, v] = bits.map(unit);
+                let [u, v] = units(bits);
                 let place = Vec3x8::splat(edges[1]).mul_add(v, Vec3x8::splat(*corner));
                 self.draw_place(point, Vec3x8::splat(edges[0]).mul_add(u, place), *normal, *area)
             }
@@ -227,7 +227,7 @@ impl<'s> SkyLight<'s> {
 /// azimuth `2 pi v`) added to the normals.
 #[inline(always)]
 pub fn scattered(n: Vec3x8, bits: [[u32; LANES]; 2]) -> Vec3x8 {
-    let [u, v] = bits.map(unit);
+    let [u, v] = units(bits);
     let (sin, cos) = (v * float8(TAU as f32)).sin_cos();
     // 1 - z^2 for z = 1 - 2u.
     let ring = (float8(4.0) * u * (float8(1.0) - u)).sqrt();
@@ -236,11 +236,17 @@ pub fn scattered(n: Vec3x8, bits: [[u32; LANES]; 2]) -> Vec3x8 {
     Vec3x8::select(Mask8::gt(length, Float8::ZERO), way * (float8(1.0) / length), n)
 }
 
+#[inline(always)]
+fn units([u, v]: [[u32; LANES]; 2]) -> [Float8; 2] {
+    [unit(u), unit(v)]
+}
+
 /// Fractions of 2^32 as numbers below 1.
 #[inline(always)]
 fn unit(bits: [u32; LANES]) -> Float8 {
     const BELOW_ONE: f32 = 1.0 - UNIT_ROUNDOFF;
-    Float8::from(bits.map(|bits| (bits as f32 + 0.5) * (1.0 / 4_294_967_296.0))).fast_min(float8(BELOW_ONE))
+    let number = |i: usize| (bits[i] as f32 + 0.5) * (1.0 / 4_294_967_296.0);
+    Float8::from(std::array::from_fn::<f32, LANES, _>(number)).fast_min(float8(BELOW_ONE))
 }
 
 /// See [`scene::frame`].
