@@ -1,9 +1,9 @@
 //! The rays that go on from hits.
 
 use super::direct::Direct;
-use super::hits::{Exact, Shaded};
+use super::hits::{Onset8, Shaded};
 use super::wave::{Branch, Wave};
-use crate::lanes::Vec3x8;
+use crate::lanes::{Vec3x8, bits};
 use crate::plan::Skip;
 
 /// Rays to be traced later: reflected, refracted, scattered.
@@ -11,12 +11,14 @@ pub(super) type Later = [Vec<Branch>; 3];
 
 impl Direct<'_> {
     /// Adds the rays that go on from hits.
-    pub(super) fn branches(&self, wave: &Wave, shaded: &[Shaded], exact: &[Exact], later: &mut Later) {
+    pub(super) fn branches(&self, wave: &Wave, shaded: &[Shaded], onsets: &[Onset8], later: &mut Later) {
         let prune = self.plan.skips.allows(Skip::Bounces);
-        for Exact { packet, lane, point, facing, material } in exact {
-            let (p, i, shaded) = (*packet, *lane, &shaded[*packet]);
+        let hits = |(p, onset): (usize, &Onset8)| bits(onset.lanes).map(move |i| (p, i));
+        for (p, i) in onsets.iter().enumerate().flat_map(hits) {
+            let (onset, shaded) = (&onsets[p], &shaded[p]);
             let color = Vec3x8::lane(&shaded.bsdf.color, i).map(f64::from).into();
-            let ways = self.materials.onward(*material).ways(color, facing);
+            let (point, facing) = (onset.point(i), onset.facing(i, wave.exact[p].lane(i).1));
+            let ways = self.materials.onward(onset.materials[i]).ways(color, &facing);
             let (weight, path) = (wave.weight(p, i), wave.path(p, i).wrapping_mul(2));
             for (list, way) in [ways.0, ways.1].into_iter().enumerate() {
                 let Some((dir, share)) = way else { continue };
@@ -28,7 +30,7 @@ impl Direct<'_> {
                 let origin = shaded.leave(dir.dot(facing.n_g) > 0.0, shaded.error).lane(i);
                 let path = path + list as u32;
                 let (slot, density) = (wave.slot(p, i) as u32, f32::INFINITY);
-                later[list].push(Branch { origin, exact: (*point, dir), weight, density, slot, path });
+                later[list].push(Branch { origin, exact: (point, dir), weight, density, slot, path });
             }
         }
     }

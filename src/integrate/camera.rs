@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
 
-use crate::lanes::{ExactPacket, Float8, LANES, Mask8, RayPacket, Vec3x8, float8};
+use crate::lanes::{ExactPacket, LANES, Mask8, RayPacket, Vec3x8, float8};
 use crate::sample::{self, Pattern, Pattern8, dimension};
 use crate::scene::{Camera, Filter, FilterTable, Lens};
 
@@ -116,8 +116,8 @@ impl CameraRays {
     #[inline(always)]
     pub fn packet(&self, exact: &ExactPacket, count: usize) -> RayPacket {
         let live = Mask8::from_bits((1u32 << count) - 1);
-        let origin = self.common.map_or_else(|| rounded(&exact.origin), Vec3x8::splat);
-        RayPacket::new(origin, rounded(&exact.dir), float8(f32::INFINITY), live)
+        let origin = self.common.map_or_else(|| Vec3x8::rounded(&exact.origin), Vec3x8::splat);
+        RayPacket::new(origin, Vec3x8::rounded(&exact.dir), float8(f32::INFINITY), live)
     }
 
     /// How far samples are from the centres of their pixels, in pixels: right, down.
@@ -234,18 +234,6 @@ impl ExactPacket {
             (self.origin[k][i], self.dir[k][i]) = (origin[k], dir[k]);
         }
     }
-}
-
-#[inline(always)]
-fn rounded(axes: &[[f64; LANES]; 3]) -> Vec3x8 {
-    let axis = |k: usize| {
-        let mut lanes = [0.0; LANES];
-        for i in 0..LANES {
-            lanes[i] = axes[k][i] as f32;
-        }
-        Float8::from(lanes)
-    };
-    Vec3x8::new(axis(0), axis(1), axis(2))
 }
 
 #[cfg(test)]

@@ -5,10 +5,10 @@ use glam::DVec3;
 use super::direct::Direct;
 use super::record::{RayKind, Record, Seen};
 use super::wave::Wave;
-use crate::lanes::{Float8, LANES, Mask8, UNIT_ROUNDOFF, Vec3x8, bits, float8};
+use crate::lanes::{Axes8, Float8, LANES, Mask8, UNIT_ROUNDOFF, Vec3x8, bits, dot8, float8};
 use crate::plan::{Owner, Skip};
 use crate::shade::{Bsdf8, Facing, attributes};
-use crate::shapes::{Ray64, Surface8};
+use crate::shapes::{Exact8, Surface8};
 
 /// Eight hits, made ready for light.
 #[derive(Debug, Clone, Copy)]
@@ -30,14 +30,18 @@ pub struct Shaded {
     pub primitives: [u32; LANES],
 }
 
-/// One hit in f64, as rays go on from it.
-#[derive(Debug, Clone, Copy)]
-pub struct Exact {
-    pub packet: usize,
-    pub lane: usize,
-    pub point: DVec3,
-    pub facing: Facing,
-    pub material: u32,
+/// Eight hits in f64, as rays go on from them.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Onset8 {
+    /// Lanes from which rays may go on; the others mean nothing.
+    pub lanes: u32,
+    pub point: Axes8,
+    /// Geometric and shading normal on the viewer's side.
+    pub n_g: Axes8,
+    pub n_s: Axes8,
+    /// Lanes whose front was met.
+    pub fronts: u32,
+    pub materials: [u32; LANES],
 }
 
 impl Direct<'_> {
@@ -48,24 +52,24 @@ impl Direct<'_> {
         wave: &Wave,
         (p, hit): (usize, u32),
         shaded: &mut Shaded,
-        exact: &mut Vec<Exact>,
+        onset: &mut Onset8,
         record: &mut R,
     ) {
         let (rays, stores) = (&wave.tile.packets[p], self.tree.stores());
         let before = wave.tile.exact.as_ref().map(|exact| &exact[p]);
         let (mut surface, owners) = stores.surface::<false>(wave.tile.hits[p], rays, rays.t_max, before);
         let owners = &owners;
+        onset.lanes = self.lanes_that_go_on(owners, hit);
         if wave.kind == RayKind::Camera {
-            let hits = wave.tile.hits[p].to_array();
+            let (hits, plain) = (wave.tile.hits[p].to_array(), hit & !onset.lanes);
             if self.plan.sharp {
-                stores.sharpen(Mask8::from_bits(hit), &hits, (rays, rays.t_max), before, &mut surface);
-            } else if let (true, Some(exact)) = (self.plan.specks, before) {
-                stores.sharpen_specks(hit, &hits, (rays, exact), &mut surface);
+                stores.sharpen(Mask8::from_bits(plain), &hits, (rays, rays.t_max), before, &mut surface);
+            } else if let (true, Some(exact)) = (self.plan.specks && plain != 0, before) {
+                stores.sharpen_specks(plain, &hits, (rays, exact), &mut surface);
             }
         }
-        let first = exact.len();
         if self.goes_on() {
-            self.refine(wave, (p, hit), owners, &mut surface, exact);
+            self.refine(wave, (p, hit), &mut surface, onset);
         }
         let front = Mask8::sign(surface.normal.dot(rays.dir));
         let materials = self.materials_of(owners, front.bits(), hit);
@@ -84,13 +88,13 @@ impl Direct<'_> {
         shaded.n_s = shaded.n_g;
         shaded.smooth = Mask8::NONE;
         self.materials.gather(materials, &mut shaded.bsdf);
-        exact[first..].iter_mut().for_each(|exact| exact.material = materials[exact.lane]);
+        onset.materials = materials;
         let all = !self.plan.skips.allows(Skip::Shading);
         if self.plan.textured || self.plan.colored || all {
             self.add_colors((wave, p), owners, &materials, shaded, record);
         }
         if self.plan.smooth || all {
-            self.add_normals(owners, shaded, &mut exact[first..]);
+            self.add_normals(owners, shaded, onset);
         }
         if R::SURFACES && wave.depth == 1 {
             let (rows, owners, materials) = (wave.tile.hits[p], owners, &materials);
@@ -147,7 +151,7 @@ impl Direct<'_> {
 
     /// Interpolated normals, turned to the side that is seen.
     #[inline(never)]
-    fn add_normals(&self, owners: &[Owner; LANES], shaded: &mut Shaded, exact: &mut [Exact]) {
+    fn add_normals(&self, owners: &[Owner; LANES], shaded: &mut Shaded, onset: &mut Onset8) {
         let (points, fronts) = (shaded.point.to_arrays(), shaded.front.bits());
         let mut normals = shaded.n_s.to_arrays();
         let mut smooth = 0;
@@ -156,42 +160,61 @@ impl Direct<'_> {
             if let Some(normal) = attributes::shading_normal(self.plan, owners[i], point) {
                 let turned = if fronts >> i & 1 == 1 { normal } else { -normal };
                 (normals[i], smooth) = (turned.as_vec3().to_array(), smooth | 1 << i);
-                exact.iter_mut().filter(|exact| exact.lane == i).for_each(|exact| exact.facing.n_s = turned);
+                (0..3).for_each(|k| onset.n_s[k][i] = turned[k]);
             }
         }
         shaded.n_s = Vec3x8::from_fn(|i| normals[i]);
         shaded.smooth = Mask8::from_bits(smooth);
     }
 
+    /// Hits from which rays may go on.
+    #[inline(always)]
+    fn lanes_that_go_on(&self, owners: &[Owner; LANES], hit: u32) -> u32 {
+        if self.is_path() {
+            return hit;
+        }
+        if !self.plan.scatters {
+            return 0;
+        }
+        bits(hit).filter(|i| self.plan.goes_on[owners[*i].material as usize]).map(|i| 1 << i).sum()
+    }
+
     /// The hits of a packet from which rays go on again in f64, rounded into `surface`. So the bits of a hit
     /// depend on its own material alone.
     #[inline(never)]
-    fn refine(
-        &self,
-        wave: &Wave,
-        (p, hit): (usize, u32),
-        owners: &[Owner; LANES],
-        surface: &mut Surface8,
-        exact: &mut Vec<Exact>,
-    ) {
-        let (rays, t) = (&wave.exact[p], wave.tile.packets[p].t_max.to_array());
-        let all = !self.plan.skips.allows(Skip::Bounces);
-        for i in bits(hit) {
-            let goes_on = self.is_path() || self.plan.goes_on[owners[i].material as usize];
-            if !goes_on && !all {
-                continue;
-            }
-            let (origin, dir) = rays.lane(i);
-            let ray = Ray64 { origin, dir, t_min: 0.0, t_max: f64::INFINITY };
-            let found = self.tree.stores().refine(wave.tile.hit(p, i), &ray, f64::from(t[i]));
-            let Some(found) = std::hint::black_box(found).filter(|_| goes_on) else { continue };
-            surface.point.set_lane(i, found.point.as_vec3().to_array());
-            surface.normal.set_lane(i, found.normal.as_vec3().to_array());
-            let front = found.normal.dot(dir) < 0.0;
-            let n_g = if front { found.normal } else { -found.normal };
-            let facing = Facing { dir: dir.normalize(), n_s: n_g, n_g, front };
-            exact.push(Exact { packet: p, lane: i, point: found.point, facing, material: 0 });
+    fn refine(&self, wave: &Wave, (p, hit): (usize, u32), surface: &mut Surface8, onset: &mut Onset8) {
+        let (hits, t) = (wave.tile.hits[p].to_array(), wave.tile.packets[p].t_max.to_array());
+        let wanted = if self.plan.skips.allows(Skip::Bounces) { onset.lanes } else { hit };
+        if wanted == 0 {
+            return;
         }
+        let rays = &wave.exact[p];
+        let Exact8 { point, normal } = std::hint::black_box(self.tree.stores().refine8(wanted, &hits, rays, &t));
+        let lanes = Mask8::from_bits(onset.lanes);
+        surface.point = Vec3x8::select(lanes, Vec3x8::rounded(&point), surface.point);
+        surface.normal = Vec3x8::select(lanes, Vec3x8::rounded(&normal), surface.normal);
+        let along = dot8(&normal, &rays.dir);
+        onset.fronts = (0..LANES).map(|i| u32::from(along[i] < 0.0) << i).sum();
+        (onset.point, onset.n_g) = (point, normal);
+        for axis in &mut onset.n_g {
+            for i in 0..LANES {
+                axis[i] = if along[i] < 0.0 { axis[i] } else { -axis[i] };
+            }
+        }
+        onset.n_s = onset.n_g;
+    }
+}
+
+impl Onset8 {
+    /// One of the hits, met by a ray of this direction.
+    pub fn facing(&self, i: usize, dir: DVec3) -> Facing {
+        let [n_s, n_g] = [&self.n_s, &self.n_g].map(|axes| DVec3::from_array(axes.map(|axis| axis[i])));
+        Facing { dir: dir.normalize(), n_s, n_g, front: self.fronts >> i & 1 == 1 }
+    }
+
+    /// Where one of them is.
+    pub fn point(&self, i: usize) -> DVec3 {
+        DVec3::from_array(self.point.map(|axis| axis[i]))
     }
 }
 

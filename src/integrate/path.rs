@@ -9,13 +9,13 @@ use glam::DVec3;
 use super::branches::Later;
 use super::camera::Samples8;
 use super::direct::Direct;
-use super::hits::{Exact, Shaded};
+use super::hits::{Onset8, Shaded};
 use super::lamps::{pairs, share};
 use super::wave::{Branch, Wave};
-use crate::lanes::{Float8, LANES, Vec3x8};
+use crate::lanes::{Axes8, Float8, LANES, Mask8, Vec3x8, bits, dot8, float8};
 use crate::sample::{dimension, unit};
 use crate::scene::Backdrop;
-use crate::shade::Way;
+use crate::shade::{Onward, Way};
 
 /// Rays from this depth on end by chance, the darker the likelier.
 const ROULETTE: u32 = 3;
@@ -37,18 +37,59 @@ impl Direct<'_> {
         &self,
         wave: &Wave,
         shaded: &[Shaded],
-        exact: &[Exact],
+        onsets: &[Onset8],
         seeds: &[Samples8],
         later: &mut Later,
     ) {
-        for exact in exact.chunk_by(|a, b| a.packet == b.packet) {
-            let p = exact[0].packet;
-            let [choice, life] = pairs(wave, p, dimension::CHOICE, seeds);
-            let scattered = Scattered8::new(exact, pairs(wave, p, dimension::SCATTER, seeds));
-            for exact in exact {
-                let chances = [choice, life].map(|axis| unit(axis[exact.lane]));
-                self.take_way(wave, &shaded[p], exact, (chances, &scattered), later);
+        for (p, onset) in onsets.iter().enumerate().filter(|(_, onset)| onset.lanes != 0) {
+            let smooth = shaded[p].smooth.any();
+            let scattered = Scattered8::new(onset, pairs(wave, p, dimension::SCATTER, seeds), smooth);
+            let chooses = |i: usize| self.materials.onward(onset.materials[i]) != Onward::Nothing;
+            let choosing: u32 = bits(onset.lanes).filter(|i| chooses(*i)).map(|i| 1 << i).sum();
+            let mut chances = [[0; LANES]; 2];
+            if choosing != 0 || wave.depth >= ROULETTE {
+                chances = pairs(wave, p, dimension::CHOICE, seeds);
             }
+            self.scatter(wave, &shaded[p], (onset, onset.lanes & !choosing), (&scattered, &chances[1]), &mut later[2]);
+            for i in bits(choosing) {
+                let chances = chances.map(|axis| unit(axis[i]));
+                self.take_way(wave, (&shaded[p], onset, i), (chances, &scattered), later);
+            }
+        }
+    }
+
+    /// Adds the rays that go on from hits on what only scatters.
+    fn scatter(
+        &self,
+        wave: &Wave,
+        shaded: &Shaded,
+        (onset, lanes): (&Onset8, u32),
+        (scattered, life): (&Scattered8, &[u32; LANES]),
+        later: &mut Vec<Branch>,
+    ) {
+        let p = shaded.packet;
+        let single = |lanes: &Lanes| Float8::from(std::array::from_fn::<f32, LANES, _>(|i| lanes[i] as f32));
+        let (softened, density) = (single(&scattered.softened), single(&scattered.density));
+        let mut weight = wave.weighted(p, shaded.bsdf.color * (shaded.bsdf.diffuse * softened));
+        let brightest = weight.x.fast_max(weight.y).fast_max(weight.z);
+        let mut lives = Mask8::gt(brightest, Float8::ZERO) & Mask8::gt(density, Float8::ZERO);
+        if wave.depth >= ROULETTE {
+            let chance = brightest.fast_min(float8(1.0));
+            let lived = |i: &usize| unit(life[*i]) < f64::from(chance.as_array()[*i]);
+            lives &= Mask8::from_bits((0..LANES).filter(lived).map(|i| 1 << i).sum());
+            weight = weight * (float8(1.0) / chance);
+        }
+        let (origin, weight) = (shaded.leave(true, shaded.error).to_arrays(), weight.to_arrays());
+        let density = density.as_array();
+        for i in bits(lives.bits() & lanes) {
+            later.push(Branch {
+                origin: origin[i],
+                exact: (onset.point(i), DVec3::from_array(scattered.dir.map(|axis| axis[i]))),
+                weight: weight[i],
+                density: density[i],
+                slot: wave.slot(p, i) as u32,
+                path: wave.path(p, i).wrapping_mul(2),
+            });
         }
     }
 
@@ -56,14 +97,14 @@ impl Direct<'_> {
     fn take_way(
         &self,
         wave: &Wave,
-        shaded: &Shaded,
-        Exact { packet: p, lane: i, point, facing, material }: &Exact,
+        (shaded, onset, i): (&Shaded, &Onset8, usize),
         ([choice, life], scattered): ([f64; 2], &Scattered8),
         later: &mut Later,
     ) {
-        let (p, i) = (*p, *i);
+        let p = shaded.packet;
         let color = DVec3::from_array(Vec3x8::lane(&shaded.bsdf.color, i).map(f64::from));
-        let ways = self.materials.onward(*material).ways(color, facing);
+        let facing = onset.facing(i, wave.exact[p].lane(i).1);
+        let ways = self.materials.onward(onset.materials[i]).ways(color, &facing);
         let albedo = color * f64::from(shaded.bsdf.diffuse.as_array()[i]);
         let path = wave.path(p, i).wrapping_mul(2);
         let Some(taken) = take(choice, albedo, ways, path, || scattered.lane(i)) else { return };
@@ -72,7 +113,7 @@ impl Direct<'_> {
         if life < lives {
             later[taken.list].push(Branch {
                 origin: shaded.leave(taken.dir.dot(facing.n_g) > 0.0, shaded.error).lane(i),
-                exact: (*point, taken.dir),
+                exact: (onset.point(i), taken.dir),
                 weight: (weight / lives).as_vec3().to_array(),
                 density: taken.density as f32,
                 slot: wave.slot(p, i) as u32,
@@ -132,7 +173,7 @@ type Lanes = [f64; LANES];
 /// Directions in which eight hits scatter, see [`scattered`](crate::shade::scattered): in f64 as all that rays go on from,
 /// but eight at a time.
 struct Scattered8 {
-    dir: [Lanes; 3],
+    dir: Axes8,
     /// 0 below the surface.
     density: Lanes,
     /// The factor on the cosine.
@@ -140,31 +181,39 @@ struct Scattered8 {
 }
 
 impl Scattered8 {
-    /// Those of the hits of one packet.
-    fn new(hits: &[Exact], bits: [[u32; LANES]; 2]) -> Self {
-        let (mut n_s, mut n_g) = ([[1.0; LANES]; 3], [[1.0; LANES]; 3]);
-        for Exact { lane, facing, .. } in hits {
-            for k in 0..3 {
-                (n_s[k][*lane], n_g[k][*lane]) = (facing.n_s[k], facing.n_g[k]);
+    /// Those of the hits of one packet; some of them may be `smooth`, with normals that are interpolated.
+    fn new(Onset8 { n_s, n_g, .. }: &Onset8, bits: [[u32; LANES]; 2], smooth: bool) -> Self {
+        let [u, v] = [0, 1].map(|k| std::array::from_fn(|i| unit(bits[k][i])));
+        let [sin, cos] = turns(&v);
+        let mut way = [[0.0; LANES]; 3];
+        for i in 0..LANES {
+            let ring = 2.0 * (u[i] * (1.0 - u[i])).sqrt();
+            way[0][i] = n_s[0][i] + ring * cos[i];
+            way[1][i] = n_s[1][i] + ring * sin[i];
+            way[2][i] = n_s[2][i] + (1.0 - 2.0 * u[i]);
+        }
+        let squared = dot8(&way, &way);
+        let length: Lanes = std::array::from_fn(|i| squared[i].sqrt());
+        let mut dir = way;
+        for (axis, normal) in dir.iter_mut().zip(n_s) {
+            for i in 0..LANES {
+                axis[i] = if length[i] > 0.0 { axis[i] / length[i] } else { normal[i] };
             }
         }
-        let [u, v] = bits.map(|bits| bits.map(unit));
-        let [sin, cos] = turns(&v);
-        let mut scattered = Scattered8 { dir: [[0.0; LANES]; 3], density: [0.0; LANES], softened: [1.0; LANES] };
+        let (cos, cos_g) = (dot8(n_s, &dir), dot8(n_g, &dir));
+        let mut density = [0.0; LANES];
         for i in 0..LANES {
-            let [n_s, n_g] = [&n_s, &n_g].map(|n| [n[0][i], n[1][i], n[2][i]]);
-            let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-            let ring = 2.0 * (u[i] * (1.0 - u[i])).sqrt();
-            let way = [n_s[0] + ring * cos[i], n_s[1] + ring * sin[i], n_s[2] + (1.0 - 2.0 * u[i])];
-            let length = dot(way, way).sqrt();
-            let dir: [f64; 3] = std::array::from_fn(|k| if length > 0.0 { way[k] / length } else { n_s[k] });
-            let (cos, cos_g) = (dot(n_s, dir), dot(n_g, dir));
-            let x = (cos_g / (cos * dot(n_s, n_g))).clamp(0.0, 1.0);
-            scattered.softened[i] = if n_s == n_g { 1.0 } else { x * (1.0 + x * (1.0 - x)) };
-            scattered.density[i] = if cos > 0.0 && cos_g > 0.0 { cos / PI } else { 0.0 };
-            (0..3).for_each(|k| scattered.dir[k][i] = dir[k]);
+            density[i] = if cos[i].min(cos_g[i]) > 0.0 { cos[i] / PI } else { 0.0 };
         }
-        scattered
+        let mut softened = [1.0; LANES];
+        if smooth {
+            let between = dot8(n_s, n_g);
+            for i in (0..LANES).filter(|i| (0..3).any(|k| n_s[k][*i] != n_g[k][*i])) {
+                let x = (cos_g[i] / (cos[i] * between[i])).clamp(0.0, 1.0);
+                softened[i] = x * (1.0 + x * (1.0 - x));
+            }
+        }
+        Scattered8 { dir, density, softened }
     }
 
     /// One of them, its density and the factor on its cosine; `None` below the surface.

@@ -155,11 +155,24 @@ impl Hit8 {
     }
 }
 
-/// Origins and directions of eight rays in f64, by axis.
+/// Eight vectors in f64, by axis.
+pub type Axes8 = [[f64; LANES]; 3];
+
+/// Dot products, not fused.
+#[inline(always)]
+pub fn dot8(a: &Axes8, b: &Axes8) -> [f64; LANES] {
+    let mut dots = [0.0; LANES];
+    for i in 0..LANES {
+        dots[i] = a[0][i] * b[0][i] + a[1][i] * b[1][i] + a[2][i] * b[2][i];
+    }
+    dots
+}
+
+/// Origins and directions of eight rays in f64.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ExactPacket {
     /// Scene units, relative to the plan's origin.
-    pub origin: [[f64; LANES]; 3],
+    pub origin: Axes8,
     /// Any length.
-    pub dir: [[f64; LANES]; 3],
+    pub dir: Axes8,
 }

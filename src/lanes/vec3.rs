@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Mul, Neg, Sub};
 
-use super::{Float8, LANES, Mask8, float8};
+use super::{Axes8, Float8, LANES, Mask8, float8};
 
 /// Eight vectors, a lane each.
 #[derive(Debug, Clone, Copy)]
@@ -42,6 +42,19 @@ impl Vec3x8 {
     pub fn from_fn(f: impl FnMut(usize) -> [f32; 3]) -> Self {
         let rows: [[f32; 3]; LANES] = std::array::from_fn(f);
         let axis = |k: usize| Float8::from(rows.map(|row| row[k]));
+        Vec3x8::new(axis(0), axis(1), axis(2))
+    }
+
+    /// From f64.
+    #[inline(always)]
+    pub fn rounded(axes: &Axes8) -> Self {
+        let axis = |k: usize| {
+            let mut lanes = [0.0; LANES];
+            for i in 0..LANES {
+                lanes[i] = axes[k][i] as f32;
+            }
+            Float8::from(lanes)
+        };
         Vec3x8::new(axis(0), axis(1), axis(2))
     }
 

@@ -26,7 +26,9 @@ use glam::{DVec2, DVec3};
 pub use self::store::{Hidden8, Store};
 pub use self::stores::{Groups, RowRef, Stores, Visit};
 
-use crate::lanes::{Columns, ExactPacket, Float8, Hit8, Mask8, Ray, RayPacket, UNIT_ROUNDOFF, Vec3x8, float8};
+use crate::lanes::{
+    Axes8, Columns, ExactPacket, Float8, Hit8, LANES, Mask8, Ray, RayPacket, UNIT_ROUNDOFF, Vec3x8, float8,
+};
 use crate::plan::Owner;
 use crate::scene::Visible;
 
@@ -61,6 +63,18 @@ pub trait Part: Clone + Send + Sync {
     fn decide(&self, ray: &Ray64, visible: Visible) -> Option<f64>;
     /// The hit near `t` again, in f64; of two that f32 cannot tell apart the first one of a side that is seen.
     fn refine(&self, ray: &Ray64, t: f64, visible: Visible) -> Surface64;
+    /// The same of up to eight parts, each met by the ray of its lane: the same bits. Lanes without a part mean nothing.
+    fn refine8(parts: &[Option<(&Self, Visible)>; LANES], rays: &ExactPacket, t: &[f32; LANES]) -> Exact8 {
+        let mut found = Exact8::default();
+        for (lane, part) in parts.iter().enumerate() {
+            let Some((part, visible)) = part else { continue };
+            let (origin, dir) = rays.lane(lane);
+            let ray = Ray64 { origin, dir, t_min: 0.0, t_max: f64::INFINITY };
+            let Surface64 { point, normal, .. } = part.refine(&ray, f64::from(t[lane]), *visible);
+            (0..3).for_each(|k| (found.point[k][lane], found.normal[k][lane]) = (point[k], normal[k]));
+        }
+        found
+    }
     /// What of them tells where the surface is.
     fn face(rows: &Self::Rows) -> &Self::Face;
     /// Where the rays are at `t`, put on the surface.
@@ -129,6 +143,29 @@ pub struct Surface64 {
     pub normal: DVec3,
 }
 
+/// Eight hit points to f64 accuracy.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Exact8 {
+    /// On the surface.
+    pub point: Axes8,
+    /// Geometric, outward, unit.
+    pub normal: Axes8,
+}
+
+impl Exact8 {
+    /// With some lanes from another.
+    #[inline(always)]
+    fn set_lanes(&mut self, lanes: u32, other: &Exact8) {
+        for k in 0..3 {
+            for i in 0..LANES {
+                let taken = lanes >> i & 1 == 1;
+                self.point[k][i] = if taken { other.point[k][i] } else { self.point[k][i] };
+                self.normal[k][i] = if taken { other.normal[k][i] } else { self.normal[k][i] };
+            }
+        }
+    }
+}
+
 /// A ray in f64, relative to the plan's origin.
 #[derive(Debug, Clone, Copy)]
 pub struct Ray64 {
@@ -192,15 +229,13 @@ pub fn noise<P: Part>(part: &P, ray: &Ray64, t: f64) -> f64 {
 
 /// The one of two roots that is nearer to `t`, which f32 may have rounded; where that cannot tell them apart the first
 /// one, or the last one where only backs are seen.
+#[inline(always)]
 fn nearer(a: f64, b: f64, t: f64, visible: Visible) -> f64 {
     let (first, last) = (a.min(b), a.max(b));
     let rounded = 16.0 * f64::from(UNIT_ROUNDOFF) * t.abs();
-    match (last - first <= rounded, visible) {
-        (true, Visible::Both | Visible::Front) => first,
-        (true, Visible::Back) => last,
-        (false, _) if (first - t).abs() <= (last - t).abs() => first,
-        (false, _) => last,
-    }
+    let is_first =
+        if last - first <= rounded { visible != Visible::Back } else { (first - t).abs() <= (last - t).abs() };
+    if is_first { first } else { last }
 }
 
 /// A length, in scene units, whose square is as small as f32 holds well: added to what places are off by, it leaves open

@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3};
 
-use super::{Hidden8, Part, Ray64, Surface8, Surface64, VANISHED, nearer, roundings, unit};
-use crate::lanes::{ExactPacket, Float8, Hit8, LANES, Mask8, RayPacket, Vec3x8, difference_of_products, float8};
+use super::{Exact8, Hidden8, Part, Ray64, Surface8, Surface64, VANISHED, nearer, roundings, unit};
+use crate::lanes::{Axes8, ExactPacket, Float8, Hit8, LANES, Mask8, RayPacket, Vec3x8, difference_of_products, float8};
 use crate::plan::{Owner, SpherePart};
 use crate::scene::Visible;
 
@@ -155,6 +155,38 @@ impl Part for SpherePart {
         Surface64 { t, point: self.center + normal * self.radius, normal }
     }
 
+    fn refine8(parts: &[Option<(&Self, Visible)>; LANES], rays: &ExactPacket, t: &[f32; LANES]) -> Exact8 {
+        let (mut center, mut radius, mut visible) = (Axes8::default(), [1.0; LANES], [Visible::Both; LANES]);
+        for (lane, part) in parts.iter().enumerate() {
+            let Some((part, side)) = part else { continue };
+            (0..3).for_each(|k| center[k][lane] = part.center[k]);
+            (radius[lane], visible[lane]) = (part.radius, *side);
+        }
+        let mut found = Exact8::default();
+        for i in 0..LANES {
+            let f: [f64; 3] = std::array::from_fn(|k| center[k][i] - rays.origin[k][i]);
+            let d: [f64; 3] = std::array::from_fn(|k| rays.dir[k][i]);
+            let dot = |a: &[f64; 3], b: &[f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+            let across: [f64; 3] = std::array::from_fn(|k| {
+                let (k, l) = ((k + 1) % 3, (k + 2) % 3);
+                f[k] * d[l] - d[k] * f[l]
+            });
+            let (fd, dd, r) = (dot(&f, &d), dot(&d, &d), radius[i]);
+            let disc = r * r * dd - dot(&across, &across);
+            let z = fd + disc.max(0.0).sqrt().copysign(fd);
+            let distance = dot(&f, &f).sqrt();
+            let (a, b) = (z / dd, (distance - r) * (distance + r) / z);
+            let t = nearer(a, b, f64::from(t[i]), visible[i]);
+            let n: [f64; 3] = std::array::from_fn(|k| t * d[k] - f[k]);
+            let scale = 1.0 / dot(&n, &n).sqrt();
+            for k in 0..3 {
+                found.normal[k][i] = n[k] * scale;
+                found.point[k][i] = center[k][i] + n[k] * scale * r;
+            }
+        }
+        found
+    }
+
     #[inline(always)]
     fn face(rows: &Self::Rows) -> &Self::Rows {
         rows
@@ -208,32 +240,6 @@ fn near_products<'a>(
         c.as_mut_array()[lane] = (f.length_squared() - radius * radius) as f32;
     }
     c
-}
-
-/// Outward normals where eight rays in f64 meet spheres near `t`; of no use where there is no sphere. Eight at a time, as
-/// they are wanted of every hit where spheres are small: what f32 takes from a center is as much as the error of `t`.
-pub(super) fn exact_normals(parts: &[Option<&SpherePart>; LANES], rays: &ExactPacket, t: &[f32; LANES]) -> Vec3x8 {
-    let (mut center, mut radius) = ([[0.0; LANES]; 3], [1.0; LANES]);
-    for (lane, part) in parts.iter().enumerate().filter_map(|(lane, part)| Some((lane, (*part)?))) {
-        (0..3).for_each(|k| center[k][lane] = part.center[k]);
-        radius[lane] = part.radius;
-    }
-    let ExactPacket { origin, dir } = rays;
-    let mut normal = [[0f32; LANES]; 3];
-    for i in 0..LANES {
-        let f: [f64; 3] = std::array::from_fn(|k| center[k][i] - origin[k][i]);
-        let d: [f64; 3] = std::array::from_fn(|k| dir[k][i]);
-        let dot = |a: &[f64; 3], b: &[f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-        let inv_dd = 1.0 / dot(&d, &d);
-        let p = dot(&f, &d) * inv_dd;
-        let perp: [f64; 3] = std::array::from_fn(|k| f[k] - d[k] * p);
-        let slack = (radius[i] * radius[i] - dot(&perp, &perp)).max(0.0);
-        let along = (slack * inv_dd).sqrt().copysign(f64::from(t[i]) - p);
-        let scale = 1.0 / (slack + dot(&perp, &perp)).sqrt();
-        (0..3).for_each(|k| normal[k][i] = ((d[k] * along - perp[k]) * scale) as f32);
-    }
-    let [x, y, z] = normal.map(Float8::from);
-    Vec3x8::new(x, y, z)
 }
 
 /// By Lagrange's identity: the discriminant `r^2 d.d - |f x d|^2`, and both roots (of a tangent where

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{Part, Ray64, Store, Surface8, Surface64, noise};
+use super::{Exact8, Part, Ray64, Store, Surface8, Surface64, noise};
 use crate::lanes::{Columns, ExactPacket, Float8, LANES, Mask8, RayPacket, Vec3x8, bits, float8};
 use crate::plan::{
     BoxPart, ConePart, CylinderPart, DiskPart, Kind, Owner, Parts, PlanePart, PolygonPart, SPECK, SpherePart,
@@ -218,11 +218,7 @@ impl Stores {
         let flatness = rays.dir.dot(rays.dir) / surface.normal.dot(rays.dir).abs();
         let specks = Mask8::gt(t * flatness, Float8::from(radius) * float8(SPECK as f32));
         if specks.any() {
-            let mut parts = [None; LANES];
-            for lane in specks.lanes() {
-                parts[lane] = self.spheres.part(RowRef::from_lane(hits[lane]).row());
-            }
-            let normal = super::sphere::exact_normals(&parts, exact, t.as_array());
+            let normal = Vec3x8::rounded(&self.refine8(specks.bits(), hits, exact, t.as_array()).normal);
             surface.normal = Vec3x8::select(specks, normal, surface.normal);
         }
     }
@@ -267,6 +263,24 @@ impl Stores {
     /// What a ray meets on a row near `t`, in f64.
     pub fn refine(&self, row: RowRef, ray: &Ray64, t: f64) -> Option<Surface64> {
         row.kind().and_then(|kind| self.visit(kind, Refine { row: row.row(), ray, t }))
+    }
+
+    /// What eight rays meet near `t` on the rows that they met, in f64; the other lanes mean nothing.
+    pub fn refine8(&self, lanes: u32, hits: &[f32; LANES], rays: &ExactPacket, t: &[f32; LANES]) -> Exact8 {
+        let (mut found, mut left) = (Exact8::default(), lanes);
+        while left != 0 {
+            let first = RowRef::from_lane(hits[left.trailing_zeros() as usize % LANES]);
+            let mut lanes = 0;
+            for (lane, hit) in hits.iter().enumerate() {
+                lanes |= u32::from(RowRef::from_lane(*hit).0 >> 28 == first.0 >> 28) << lane;
+            }
+            lanes &= left;
+            left &= !lanes;
+            let Some(kind) = first.kind() else { continue };
+            let more = self.visit(kind, RefineEight { lanes, hits, rays, t });
+            if lanes == u32::MAX >> (32 - LANES) { found = more } else { found.set_lanes(lanes, &more) }
+        }
+        found
     }
 
     /// Texture coordinates of a point, relative to the plan's origin, on a row.
@@ -430,6 +444,25 @@ impl Visit for Refine<'_> {
     fn visit<P: Part>(self, store: &Store<P>) -> Self::Output {
         let visible = store.sides().row(self.row);
         store.part(self.row).map(|part| part.refine(self.ray, self.t, visible))
+    }
+}
+
+struct RefineEight<'a> {
+    lanes: u32,
+    hits: &'a [f32; LANES],
+    rays: &'a ExactPacket,
+    t: &'a [f32; LANES],
+}
+
+impl Visit for RefineEight<'_> {
+    type Output = Exact8;
+    fn visit<P: Part>(self, store: &Store<P>) -> Exact8 {
+        let mut parts = [None; LANES];
+        for lane in bits(self.lanes) {
+            let row = RowRef::from_lane(self.hits[lane]).row();
+            parts[lane] = store.part(row).map(|part| (part, store.sides().row(row)));
+        }
+        P::refine8(&parts, self.rays, self.t)
     }
 }
 

@@ -305,6 +305,47 @@ fn flat_hits_of_spheres_have_the_normals_of_f64() {
     }
 }
 
+/// Each of eight hits in f64 has the bits that it has alone, whatever the other lanes met: also from so far away that f32
+/// cannot tell the entry from the exit.
+#[test]
+fn eight_hits_in_f64_are_those_of_one_by_one() {
+    for visible in [Visible::Both, Visible::Back] {
+        let mut dice = Dice(11);
+        let mut object_of = |maker: Maker| object(maker(dice.in_cube(3.0), dice.between(0.3, 1.0), turn(&mut dice)), 0);
+        let objects: Vec<_> = MAKERS.iter().flat_map(|(_, maker)| [object_of(*maker), object_of(*maker)]).collect();
+        let (count, mut clay) = (objects.len(), gray(0.5));
+        clay.visible = visible;
+        let scene = Scene { objects, materials: vec![clay], ..Scene::default() };
+        let plan = Plan::new(&scene, DVec3::ZERO);
+        let stores = Stores::new(plan.parts(), None, &plan.visible);
+        let (mut judged, mut case) = (0, 0);
+        while case < 4000 {
+            let (mut lines, mut hits, mut t, mut lanes) = (Vec::new(), [0.0; LANES], [0.0; LANES], 0);
+            for lane in 0..LANES {
+                let origin = dice.direction() * if case % 3 == 0 { 3e8 } else { dice.log_between(4.0, 300.0) };
+                let line = ray(origin, dice.in_cube(4.0) - origin);
+                if let Some((place, row)) = first_row(&stores, &line, (case % count) as u32) {
+                    (hits[lane], t[lane], lanes) = (row.to_lane(), place, lanes | 1 << lane);
+                }
+                lines.push(Ray64 { t_min: 0.0, t_max: f64::INFINITY, ..Ray64::exact(&line) });
+                case += 1;
+            }
+            let axis = |of: &dyn Fn(&Ray64) -> f64| std::array::from_fn(|lane| of(&lines[lane]));
+            let origin = [0, 1, 2].map(|k| axis(&|line| line.origin[k]));
+            let rays = ExactPacket { origin, dir: [0, 1, 2].map(|k| axis(&|line| line.dir[k])) };
+            let found = stores.refine8(lanes, &hits, &rays, &t);
+            for lane in Mask8::from_bits(lanes).lanes() {
+                let row = RowRef::from_lane(hits[lane]);
+                let one = stores.refine(row, &lines[lane], f64::from(t[lane])).expect("a row");
+                assert_eq!(found.point.map(|axis| axis[lane]), one.point.to_array(), "{row:?}");
+                assert_eq!(found.normal.map(|axis| axis[lane]), one.normal.to_array(), "{row:?}");
+                judged += 1;
+            }
+        }
+        assert!(judged > 100, "{judged}");
+    }
+}
+
 /// The points that light and spawned rays start from: in f64 the reference's own, in f32 no further from
 /// the surface than they say.
 #[test]
