@@ -23,8 +23,9 @@ use crate::tracer::{Found, Hit, Room, TILE, Tracer};
 
 /// Fewest repetitions.
 pub const LEAST_REPEATS: u32 = 5;
-/// A repetition traces at least so many rays.
+/// A repetition traces at least so many rays, or passes for at least so many seconds.
 const LEAST_RAYS: usize = 1 << 20;
+const LEAST_SECONDS: f64 = 0.5;
 /// Rays of each set that are traced one by one first.
 const PROVEN: usize = 1024;
 /// Tiles a task of rays that are made in place.
@@ -290,8 +291,10 @@ impl Bench<'_> {
 
     /// Passes over a set, once before the clock starts; seconds a pass, by the wall and by the threads' clocks.
     fn timed(&self, rays: usize, mut once: impl FnMut() -> Counts) -> (Counts, Times) {
-        let passes = LEAST_RAYS.div_ceil(rays.max(1)).max(1);
+        let start = Instant::now();
         let counts = once();
+        let in_time = (LEAST_SECONDS / start.elapsed().as_secs_f64()).ceil() as usize;
+        let passes = LEAST_RAYS.div_ceil(rays.max(1)).min(in_time).max(1);
         let mut times = Times::default();
         for _ in 0..self.repeats {
             let (start, cpu) = (Instant::now(), self.cpu_seconds());
