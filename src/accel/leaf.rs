@@ -216,6 +216,9 @@ impl<const ANY: bool, const CULL: bool> LineLeaf<'_, ANY, CULL> {
             let line = &mut self.lines[usize::from(*number)];
             let ray = line.splat();
             let anchor = P::anchor(rows, &ray.origin);
+            if P::beyond::<CERTIFY>(rows, &anchor, &ray).all() {
+                continue;
+            }
             let hit = P::hit::<CULL, CERTIFY>(rows, &anchor, &ray, &hidden, |lane| store.part(row(lane)));
             let lanes = (hit.mask | hit.doubt).bits() & ((1 << count) - 1);
             if lanes == 0 {

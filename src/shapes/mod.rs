@@ -47,6 +47,12 @@ pub trait Part: Clone + Send + Sync {
     fn bounds8(rows: &Self::Rows) -> (Vec3x8, Vec3x8);
     /// What the kernel needs of these rows for rays from `origin`.
     fn anchor(rows: &Self::Rows, origin: &Vec3x8) -> Self::Anchor;
+    /// Lanes that are not met for certain, by as little of their rows as can tell: asked before one ray is held against eight
+    /// rows, most of whose memory it then need not touch.
+    #[inline(always)]
+    fn beyond<const CERTIFY: bool>(_: &Self::Rows, _: &Self::Anchor, _: &RayPacket) -> Mask8 {
+        Mask8::NONE
+    }
     /// First hit with `t_min < t <= t_max`; with `CULL` hidden sides are not met. With `CERTIFY` it says what f32
     /// cannot tell: the error of `t`, which hits within that of the end of the ray are told of too, and doubts. `part`
     /// tells what a lane of `rows` stands for.

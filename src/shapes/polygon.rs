@@ -17,6 +17,9 @@ pub struct Anchor {
     slip: Float8,   // of places on the polygon, but for that of what is as long as the way to there
 }
 
+/// More than what rounding takes from the distance of a place on the polygon and from its radius.
+const BEYOND: f32 = 1.0 + 32.0 * UNIT_ROUNDOFF;
+
 /// A place that f32 holds, beside `place` and as near the plane through it as there is one: what a corner of f32 loses to
 /// rounding moves no plane.
 fn held(place: DVec3, normal: DVec3) -> DVec3 {
@@ -87,6 +90,16 @@ impl<const N: usize> Part for PolygonPart<N> {
     fn anchor((([center, normal], [_, slip, _]), _): &Self::Rows, origin: &Vec3x8) -> Anchor {
         let f = *center - *origin;
         Anchor { f, height: normal.dot(f), slip: roundings(31.0).mul_add(f.abs().sum(), *slip) }
+    }
+
+    /// By the circle around the corners, which needs no edges.
+    #[inline(always)]
+    fn beyond<const CERTIFY: bool>(((rows, [radius, ..]), _): &Self::Rows, anchor: &Anchor, rays: &RayPacket) -> Mask8 {
+        let dir = rays.dir.abs().sum();
+        let crossing = Crossing::within::<CERTIFY>(anchor.height, anchor.slip, rows[1].dot(rays.dir), dir);
+        let x = rays.dir.mul_add(crossing.t, -anchor.f);
+        let reach = crossing.error.mul_add(dir, *radius) * float8(BEYOND);
+        !crossing.on::<CERTIFY>(rays).0 | Mask8::gt(x.dot(x), reach * reach)
     }
 
     /// `t` comes from the plane, as in equation (6) of the paper; the point there, seen from the center so that
