@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """octray beside Embree, POV-Ray, Tachyon and Mitsuba 3: Markdown tables on standard output.
 
-  peers.py [rays] [frames] [nff] [errors]      default: rays frames nff
+  peers.py [rays] [trees] [frames] [nff] [errors]      default: all but the errors
            [--octray BINARY] [--scenes fig5,flake,...] [--reps N] [--dir WORKDIR] [--scenes-nff FOLDER]
 
 rays    million rays per CPU second, one thread, on the very rays that embree_bench dumps: the best of Embree 3 and 4 in any
         packet width and flag against `octray query`. Hit counts are printed beside each other.
+trees   seconds to build a tree with 2 threads, and what it holds, beside Embree at its highest quality.
 frames  the same picture by every renderer, 2 threads: seconds of tracing as each of them reports it, and of the whole process.
 nff     procedural scenes (NFF) by Tachyon and octray, 512 x 512, mirrors and glass to depth 5.
 errors  an area light, direct and with paths: seconds against relative MSE to each renderer's own converged picture, octray (as many
@@ -121,15 +122,39 @@ def rays():
                 print(f'| {name} | {label} | {got[0]:.1f} | {rate:.1f} | {mode} | **{got[0] / rate:.2f}** | {got[1]} / {", ".join(map(str, sorted(hits[key])))} |', flush=True)
         os.remove(f'{RES}/{name}.dump')
 
+def octray_stats(path, spp, res, *more):
+    stats = RES + '/stats.json'
+    done = once([OCTRAY, 'render', path, '-o', RES + '/octray.exr', '--spp', str(spp), '--resolution', '%dx%d' % res, '-t', '2', '--stats', stats, '-q', *more])
+    return done and (json.load(open(stats)), done[0])
+
+def trees():
+    if not libraries(): print('\nEmbree is not installed: no table of trees.'); return
+    head('Trees, 2 threads: seconds to build (megabytes of tree and columns, or geometry)', 'Embree at its highest quality.')
+    print('| scene | octray | Embree 3 | Embree 4 | times as long as the best |\n|---|---|---|---|---|')
+    for name in SCENES:
+        say('tree', name)
+        runs = [r for r in (octray_stats(scene(name, 'scene.toml'), 1, (16, 16)) for _ in range(max(3, A.reps))) if r]
+        memory = runs[0][0]['memory']
+        ours = (min(stats['seconds']['build'] for stats, _ in runs), (memory['column_bytes'] + memory['tree_bytes']) / 1e6)
+        theirs = []
+        for lib in libraries():
+            done = once([W + '/embree_bench', lib, scene(name), '--threads', '2', '--quality', 'H', '--modes', '1', '--reps', '3'])
+            row = next((l.split(',') for l in (done[2] if done else '').splitlines() if l.startswith('build,')), None)
+            megabytes = lambda field: float(field.split()[-2])
+            if row: theirs.append((float(row[5].split()[0]), megabytes(row[6]) + megabytes(row[8])))
+        cell = lambda t: f'{t[0]:.4f} ({t[1]:.1f})'
+        cells = [cell(t) for t in theirs] + ['-'] * (2 - len(theirs))
+        fastest = min((t[0] for t in theirs), default=0)
+        print(f'| {name} | {cell(ours)} | {" | ".join(cells)} | {f"**{ours[0] / fastest:.1f}**" if fastest else "-"} |', flush=True)
+
 # ---------------------------------------------------------------- frames
 def size(name): return (640, 480) if name == 'fig5' else (1024, 1024)
 def reported(text, mark):
     return next((float(l.split(mark)[1].split()[0]) for l in text.splitlines() if mark in l), None)
 
-def octray_frame(path, spp, res, *more):
-    stats = RES + '/stats.json'
-    done = once([OCTRAY, 'render', path, '-o', RES + '/octray.exr', '--spp', str(spp), '--resolution', '%dx%d' % res, '-t', '2', '--stats', stats, '-q', *more])
-    return done and (json.load(open(stats))['seconds']['trace'], done[0])
+def octray_frame(*words):
+    done = octray_stats(*words)
+    return done and (done[0]['seconds']['trace'], done[1])
 
 def povray_frame(name, spp):
     if not has('povray'): return None
@@ -241,8 +266,9 @@ def print_ratios(label, uniform, noise, theirs):
         if own and other:
             print(f'| {label} | **at {error:.0e}** | octray {min(own):.4f} s, Mitsuba {other:.4f} s | **1/{other / min(own):.1f}** | |', flush=True)
 
-STAGES = dict(rays=rays, frames=frames, nff=nff, errors=errors)
-for stage in A.stages or ['rays', 'frames', 'nff']:
+STAGES = dict(rays=rays, trees=trees, frames=frames, nff=nff, errors=errors)
+CHOSEN = A.stages or [stage for stage in STAGES if stage != 'errors']
+for stage in CHOSEN:
     if stage not in STAGES: sys.exit(f'{stage} is none of {", ".join(STAGES)}')
 if not os.access(OCTRAY, os.X_OK): sys.exit(f'{OCTRAY} is not there: cargo build --release, or say --octray BINARY')
-for stage in A.stages or ['rays', 'frames', 'nff']: STAGES[stage]()
+for stage in CHOSEN: STAGES[stage]()
