@@ -1,4 +1,4 @@
-//! How the cost grows with the work: time against the number of spheres (1e2 to 1e7) and against the number of pixels.
+//! How the cost grows with the work: time and tests against the number of spheres (1e2 to 1e7), time against pixels.
 //!
 //! `cargo bench --bench scaling [-- MOST_SPHERES [FOLDER]]` prints two Markdown tables with the slopes (1: twice the work,
 //! twice the time) and writes them as plots, SVG, to FOLDER (target/scaling). The spheres of every scene cover the same

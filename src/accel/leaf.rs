@@ -216,7 +216,7 @@ impl<const ANY: bool, const CULL: bool> LineLeaf<'_, ANY, CULL> {
             let line = &mut self.lines[usize::from(*number)];
             let ray = line.splat();
             let anchor = P::anchor(rows, &ray.origin);
-            if P::beyond::<CERTIFY>(rows, &anchor, &ray).all() {
+            if CERTIFY && P::misses(rows, &anchor, &ray).all() {
                 continue;
             }
             let hit = P::hit::<CULL, CERTIFY>(rows, &anchor, &ray, &hidden, |lane| store.part(row(lane)));

@@ -1,7 +1,7 @@
 //! The rays that go on from hits.
 
 use super::direct::Direct;
-use super::hits::{Onset8, Shaded};
+use super::hits::{Shaded, Vertex8};
 use super::wave::{Branch, Wave};
 use crate::lanes::{Vec3x8, bits};
 use crate::plan::Skip;
@@ -11,14 +11,14 @@ pub(super) type Later = [Vec<Branch>; 3];
 
 impl Direct<'_> {
     /// Adds the rays that go on from hits.
-    pub(super) fn branches(&self, wave: &Wave, shaded: &[Shaded], onsets: &[Onset8], later: &mut Later) {
+    pub(super) fn branches(&self, wave: &Wave, shaded: &[Shaded], vertices: &[Vertex8], later: &mut Later) {
         let prune = self.plan.skips.allows(Skip::Bounces);
-        let hits = |(p, onset): (usize, &Onset8)| bits(onset.lanes).map(move |i| (p, i));
-        for (p, i) in onsets.iter().enumerate().flat_map(hits) {
-            let (onset, shaded) = (&onsets[p], &shaded[p]);
+        let hits = |(p, vertex): (usize, &Vertex8)| bits(vertex.lanes).map(move |i| (p, i));
+        for (p, i) in vertices.iter().enumerate().flat_map(hits) {
+            let (vertex, shaded) = (&vertices[p], &shaded[p]);
             let color = Vec3x8::lane(&shaded.bsdf.color, i).map(f64::from).into();
-            let (point, facing) = (onset.point(i), onset.facing(i, wave.exact[p].lane(i).1));
-            let ways = self.materials.onward(onset.materials[i]).ways(color, &facing);
+            let (point, facing) = (vertex.point(i), vertex.facing(i, wave.exact[p].lane(i).1));
+            let ways = self.materials.onward(vertex.materials[i]).ways(color, &facing);
             let (weight, path) = (wave.weight(p, i), wave.path(p, i).wrapping_mul(2));
             for (list, way) in [ways.0, ways.1].into_iter().enumerate() {
                 let Some((dir, share)) = way else { continue };

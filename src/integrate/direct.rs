@@ -7,7 +7,7 @@ use std::slice::from_mut;
 
 use super::branches::Later;
 use super::camera::Samples8;
-use super::hits::{Onset8, Shaded};
+use super::hits::{Shaded, Vertex8};
 use super::lamps::Lamps;
 use super::record::{RayCounts, RayKind, Record};
 use super::shadows::Shadows;
@@ -64,7 +64,7 @@ pub struct Room {
     /// Rays that look for lights.
     scratch: Box<Tile>,
     shaded: Vec<Shaded>,
-    onsets: Vec<Onset8>,
+    vertices: Vec<Vertex8>,
     later: Later,
 }
 
@@ -93,7 +93,7 @@ impl Default for Room {
             shadows: Shadows::default(),
             scratch: Box::new(Tile::empty()),
             shaded: vec![Shaded::NOTHING; PACKETS],
-            onsets: vec![Onset8::default(); PACKETS],
+            vertices: vec![Vertex8::default(); PACKETS],
             later: Later::default(),
         }
     }
@@ -226,13 +226,13 @@ impl<'s> Direct<'s> {
 
     /// Shades what the rays of the wave met.
     fn light<R: Record>(&self, room: &mut Room, record: &mut R) {
-        let Room { walk, rays, left_out, wave, samples, seeds, shadows, scratch, shaded, onsets, later, .. } = room;
+        let Room { walk, rays, left_out, wave, samples, seeds, shadows, scratch, shaded, vertices, later, .. } = room;
         let kind = wave.kind as usize;
         let live: [u32; PACKETS] = std::array::from_fn(|p| wave.tile.packets[p].live().bits());
         let wave = &**wave;
         let mut radiance = [Vec3x8::ZERO; PACKETS];
         let mut seen = 0;
-        onsets.iter_mut().for_each(|onset| onset.lanes = 0);
+        vertices.iter_mut().for_each(|vertex| vertex.lanes = 0);
         let taken = {
             let (shadows, scratch, walk) = (&mut *shadows, &mut **scratch, &mut *walk);
             let (left_out, record) = (&mut *left_out, &mut *record);
@@ -250,7 +250,7 @@ impl<'s> Direct<'s> {
             let hit = hit & !taken[p];
             if hit != 0 {
                 seen |= 1 << p;
-                self.shade(wave, (p, hit), &mut shaded[p], &mut onsets[p], record);
+                self.shade(wave, (p, hit), &mut shaded[p], &mut vertices[p], record);
                 self.add_ambient(wave, &shaded[p], &mut radiance[p]);
             }
         }
@@ -267,8 +267,8 @@ impl<'s> Direct<'s> {
         }
         if wave.depth < self.settings.max_depth && self.goes_on() {
             match self.settings.integrator {
-                Integrator::Path => self.take_ways(wave, shaded, onsets, seeds, later),
-                Integrator::Direct | Integrator::Ao => self.branches(wave, shaded, onsets, later),
+                Integrator::Path => self.take_ways(wave, shaded, vertices, seeds, later),
+                Integrator::Direct | Integrator::Ao => self.branches(wave, shaded, vertices, later),
             }
         }
         shadows.end_wave(wave, live, radiance);

@@ -5,10 +5,10 @@ use glam::DVec3;
 use super::direct::Direct;
 use super::record::{RayKind, Record, Seen};
 use super::wave::Wave;
-use crate::lanes::{Axes8, Float8, LANES, Mask8, UNIT_ROUNDOFF, Vec3x8, bits, dot8, float8};
+use crate::lanes::{DVec3x8, Float8, LANES, Mask8, UNIT_ROUNDOFF, Vec3x8, bits, dot8, float8};
 use crate::plan::{Owner, Skip};
 use crate::shade::{Bsdf8, Facing, attributes};
-use crate::shapes::{Exact8, Surface8};
+use crate::shapes::{Surface8, Surface64x8};
 
 /// Eight hits, made ready for light.
 #[derive(Debug, Clone, Copy)]
@@ -32,13 +32,13 @@ pub struct Shaded {
 
 /// Eight hits in f64, as rays go on from them.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Onset8 {
+pub struct Vertex8 {
     /// Lanes from which rays may go on; the others mean nothing.
     pub lanes: u32,
-    pub point: Axes8,
+    pub point: DVec3x8,
     /// Geometric and shading normal on the viewer's side.
-    pub n_g: Axes8,
-    pub n_s: Axes8,
+    pub n_g: DVec3x8,
+    pub n_s: DVec3x8,
     /// Lanes whose front was met.
     pub fronts: u32,
     pub materials: [u32; LANES],
@@ -52,16 +52,16 @@ impl Direct<'_> {
         wave: &Wave,
         (p, hit): (usize, u32),
         shaded: &mut Shaded,
-        onset: &mut Onset8,
+        vertex: &mut Vertex8,
         record: &mut R,
     ) {
         let (rays, stores) = (&wave.tile.packets[p], self.tree.stores());
         let before = wave.tile.exact.as_ref().map(|exact| &exact[p]);
         let (mut surface, owners) = stores.surface::<false>(wave.tile.hits[p], rays, rays.t_max, before);
         let owners = &owners;
-        onset.lanes = self.lanes_that_go_on(owners, hit);
+        vertex.lanes = self.lanes_that_go_on(owners, hit);
         if wave.kind == RayKind::Camera {
-            let (hits, plain) = (wave.tile.hits[p].to_array(), hit & !onset.lanes);
+            let (hits, plain) = (wave.tile.hits[p].to_array(), hit & !vertex.lanes);
             if self.plan.sharp {
                 stores.sharpen(Mask8::from_bits(plain), &hits, (rays, rays.t_max), before, &mut surface);
             } else if let (true, Some(exact)) = (self.plan.specks && plain != 0, before) {
@@ -69,7 +69,7 @@ impl Direct<'_> {
             }
         }
         if self.goes_on() {
-            self.refine(wave, (p, hit), &mut surface, onset);
+            self.refine(wave, (p, hit), &mut surface, vertex);
         }
         let front = Mask8::sign(surface.normal.dot(rays.dir));
         let materials = self.materials_of(owners, front.bits(), hit);
@@ -88,13 +88,13 @@ impl Direct<'_> {
         shaded.n_s = shaded.n_g;
         shaded.smooth = Mask8::NONE;
         self.materials.gather(materials, &mut shaded.bsdf);
-        onset.materials = materials;
+        vertex.materials = materials;
         let all = !self.plan.skips.allows(Skip::Shading);
         if self.plan.textured || self.plan.colored || all {
             self.add_colors((wave, p), owners, &materials, shaded, record);
         }
         if self.plan.smooth || all {
-            self.add_normals(owners, shaded, onset);
+            self.add_normals(owners, shaded, vertex);
         }
         if R::SURFACES && wave.depth == 1 {
             let (rows, owners, materials) = (wave.tile.hits[p], owners, &materials);
@@ -151,7 +151,7 @@ impl Direct<'_> {
 
     /// Interpolated normals, turned to the side that is seen.
     #[inline(never)]
-    fn add_normals(&self, owners: &[Owner; LANES], shaded: &mut Shaded, onset: &mut Onset8) {
+    fn add_normals(&self, owners: &[Owner; LANES], shaded: &mut Shaded, vertex: &mut Vertex8) {
         let (points, fronts) = (shaded.point.to_arrays(), shaded.front.bits());
         let mut normals = shaded.n_s.to_arrays();
         let mut smooth = 0;
@@ -160,7 +160,7 @@ impl Direct<'_> {
             if let Some(normal) = attributes::shading_normal(self.plan, owners[i], point) {
                 let turned = if fronts >> i & 1 == 1 { normal } else { -normal };
                 (normals[i], smooth) = (turned.as_vec3().to_array(), smooth | 1 << i);
-                (0..3).for_each(|k| onset.n_s[k][i] = turned[k]);
+                (0..3).for_each(|k| vertex.n_s[k][i] = turned[k]);
             }
         }
         shaded.n_s = Vec3x8::from_fn(|i| normals[i]);
@@ -182,30 +182,30 @@ impl Direct<'_> {
     /// The hits of a packet from which rays go on again in f64, rounded into `surface`. So the bits of a hit
     /// depend on its own material alone.
     #[inline(never)]
-    fn refine(&self, wave: &Wave, (p, hit): (usize, u32), surface: &mut Surface8, onset: &mut Onset8) {
+    fn refine(&self, wave: &Wave, (p, hit): (usize, u32), surface: &mut Surface8, vertex: &mut Vertex8) {
         let (hits, t) = (wave.tile.hits[p].to_array(), wave.tile.packets[p].t_max.to_array());
-        let wanted = if self.plan.skips.allows(Skip::Bounces) { onset.lanes } else { hit };
+        let wanted = if self.plan.skips.allows(Skip::Bounces) { vertex.lanes } else { hit };
         if wanted == 0 {
             return;
         }
         let rays = &wave.exact[p];
-        let Exact8 { point, normal } = std::hint::black_box(self.tree.stores().refine8(wanted, &hits, rays, &t));
-        let lanes = Mask8::from_bits(onset.lanes);
+        let Surface64x8 { point, normal } = self.tree.stores().refine8(wanted, &hits, rays, &t);
+        let lanes = Mask8::from_bits(vertex.lanes);
         surface.point = Vec3x8::select(lanes, Vec3x8::rounded(&point), surface.point);
         surface.normal = Vec3x8::select(lanes, Vec3x8::rounded(&normal), surface.normal);
         let along = dot8(&normal, &rays.dir);
-        onset.fronts = (0..LANES).map(|i| u32::from(along[i] < 0.0) << i).sum();
-        (onset.point, onset.n_g) = (point, normal);
-        for axis in &mut onset.n_g {
+        vertex.fronts = (0..LANES).map(|i| u32::from(along[i] < 0.0) << i).sum();
+        (vertex.point, vertex.n_g) = (point, normal);
+        for axis in &mut vertex.n_g {
             for i in 0..LANES {
                 axis[i] = if along[i] < 0.0 { axis[i] } else { -axis[i] };
             }
         }
-        onset.n_s = onset.n_g;
+        vertex.n_s = vertex.n_g;
     }
 }
 
-impl Onset8 {
+impl Vertex8 {
     /// One of the hits, met by a ray of this direction.
     pub fn facing(&self, i: usize, dir: DVec3) -> Facing {
         let [n_s, n_g] = [&self.n_s, &self.n_g].map(|axes| DVec3::from_array(axes.map(|axis| axis[i])));

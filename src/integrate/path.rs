@@ -9,10 +9,10 @@ use glam::DVec3;
 use super::branches::Later;
 use super::camera::Samples8;
 use super::direct::Direct;
-use super::hits::{Onset8, Shaded};
+use super::hits::{Shaded, Vertex8};
 use super::lamps::{pairs, share};
 use super::wave::{Branch, Wave};
-use crate::lanes::{Axes8, Float8, LANES, Mask8, Vec3x8, bits, dot8, float8};
+use crate::lanes::{DVec3x8, Float8, LANES, Mask8, Vec3x8, bits, dot8, float8};
 use crate::sample::{dimension, unit};
 use crate::scene::Backdrop;
 use crate::shade::{Onward, Way};
@@ -37,23 +37,29 @@ impl Direct<'_> {
         &self,
         wave: &Wave,
         shaded: &[Shaded],
-        onsets: &[Onset8],
+        vertices: &[Vertex8],
         seeds: &[Samples8],
         later: &mut Later,
     ) {
-        for (p, onset) in onsets.iter().enumerate().filter(|(_, onset)| onset.lanes != 0) {
+        for (p, vertex) in vertices.iter().enumerate().filter(|(_, vertex)| vertex.lanes != 0) {
             let smooth = shaded[p].smooth.any();
-            let scattered = Scattered8::new(onset, pairs(wave, p, dimension::SCATTER, seeds), smooth);
-            let chooses = |i: usize| self.materials.onward(onset.materials[i]) != Onward::Nothing;
-            let choosing: u32 = bits(onset.lanes).filter(|i| chooses(*i)).map(|i| 1 << i).sum();
-            let mut chances = [[0; LANES]; 2];
+            let scattered = Scattered8::new(vertex, pairs(wave, p, dimension::SCATTER, seeds), smooth);
+            let chooses = |i: usize| self.materials.onward(vertex.materials[i]) != Onward::Nothing;
+            let choosing: u32 = bits(vertex.lanes).filter(|i| chooses(*i)).map(|i| 1 << i).sum();
+            let mut numbers = [[0; LANES]; 2];
             if choosing != 0 || wave.depth >= ROULETTE {
-                chances = pairs(wave, p, dimension::CHOICE, seeds);
+                numbers = pairs(wave, p, dimension::CHOICE, seeds);
             }
-            self.scatter(wave, &shaded[p], (onset, onset.lanes & !choosing), (&scattered, &chances[1]), &mut later[2]);
+            self.scatter(
+                wave,
+                &shaded[p],
+                (vertex, vertex.lanes & !choosing),
+                (&scattered, &numbers[1]),
+                &mut later[2],
+            );
             for i in bits(choosing) {
-                let chances = chances.map(|axis| unit(axis[i]));
-                self.take_way(wave, (&shaded[p], onset, i), (chances, &scattered), later);
+                let numbers = numbers.map(|axis| unit(axis[i]));
+                self.take_way(wave, (&shaded[p], vertex, i), (numbers, &scattered), later);
             }
         }
     }
@@ -63,7 +69,7 @@ impl Direct<'_> {
         &self,
         wave: &Wave,
         shaded: &Shaded,
-        (onset, lanes): (&Onset8, u32),
+        (vertex, lanes): (&Vertex8, u32),
         (scattered, life): (&Scattered8, &[u32; LANES]),
         later: &mut Vec<Branch>,
     ) {
@@ -84,7 +90,7 @@ impl Direct<'_> {
         for i in bits(lives.bits() & lanes) {
             later.push(Branch {
                 origin: origin[i],
-                exact: (onset.point(i), DVec3::from_array(scattered.dir.map(|axis| axis[i]))),
+                exact: (vertex.point(i), DVec3::from_array(scattered.dir.map(|axis| axis[i]))),
                 weight: weight[i],
                 density: density[i],
                 slot: wave.slot(p, i) as u32,
@@ -97,14 +103,14 @@ impl Direct<'_> {
     fn take_way(
         &self,
         wave: &Wave,
-        (shaded, onset, i): (&Shaded, &Onset8, usize),
+        (shaded, vertex, i): (&Shaded, &Vertex8, usize),
         ([choice, life], scattered): ([f64; 2], &Scattered8),
         later: &mut Later,
     ) {
         let p = shaded.packet;
         let color = DVec3::from_array(Vec3x8::lane(&shaded.bsdf.color, i).map(f64::from));
-        let facing = onset.facing(i, wave.exact[p].lane(i).1);
-        let ways = self.materials.onward(onset.materials[i]).ways(color, &facing);
+        let facing = vertex.facing(i, wave.exact[p].lane(i).1);
+        let ways = self.materials.onward(vertex.materials[i]).ways(color, &facing);
         let albedo = color * f64::from(shaded.bsdf.diffuse.as_array()[i]);
         let path = wave.path(p, i).wrapping_mul(2);
         let Some(taken) = take(choice, albedo, ways, path, || scattered.lane(i)) else { return };
@@ -113,7 +119,7 @@ impl Direct<'_> {
         if life < lives {
             later[taken.list].push(Branch {
                 origin: shaded.leave(taken.dir.dot(facing.n_g) > 0.0, shaded.error).lane(i),
-                exact: (onset.point(i), taken.dir),
+                exact: (vertex.point(i), taken.dir),
                 weight: (weight / lives).as_vec3().to_array(),
                 density: taken.density as f32,
                 slot: wave.slot(p, i) as u32,
@@ -173,7 +179,7 @@ type Lanes = [f64; LANES];
 /// Directions in which eight hits scatter, see [`scattered`](crate::shade::scattered): in f64 as all that rays go on from,
 /// but eight at a time.
 struct Scattered8 {
-    dir: Axes8,
+    dir: DVec3x8,
     /// 0 below the surface.
     density: Lanes,
     /// The factor on the cosine.
@@ -182,7 +188,7 @@ struct Scattered8 {
 
 impl Scattered8 {
     /// Those of the hits of one packet; some of them may be `smooth`, with normals that are interpolated.
-    fn new(Onset8 { n_s, n_g, .. }: &Onset8, bits: [[u32; LANES]; 2], smooth: bool) -> Self {
+    fn new(Vertex8 { n_s, n_g, .. }: &Vertex8, bits: [[u32; LANES]; 2], smooth: bool) -> Self {
         let [u, v] = [0, 1].map(|k| std::array::from_fn(|i| unit(bits[k][i])));
         let [sin, cos] = turns(&v);
         let mut way = [[0.0; LANES]; 3];

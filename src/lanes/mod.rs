@@ -13,7 +13,7 @@ mod vec3;
 pub use column::Columns;
 pub use float::{Float8, difference_of_products, first_least, float8, greatest, least};
 pub use mask::{Mask8, bits};
-pub use packet::{Axes8, ExactPacket, Hit8, RayPacket, dot8};
+pub use packet::{DVec3x8, ExactPacket, Hit8, RayPacket, dot8};
 pub use ray::Ray;
 pub use vec3::Vec3x8;
 

@@ -156,11 +156,11 @@ impl Hit8 {
 }
 
 /// Eight vectors in f64, by axis.
-pub type Axes8 = [[f64; LANES]; 3];
+pub type DVec3x8 = [[f64; LANES]; 3];
 
 /// Dot products, not fused.
 #[inline(always)]
-pub fn dot8(a: &Axes8, b: &Axes8) -> [f64; LANES] {
+pub fn dot8(a: &DVec3x8, b: &DVec3x8) -> [f64; LANES] {
     let mut dots = [0.0; LANES];
     for i in 0..LANES {
         dots[i] = a[0][i] * b[0][i] + a[1][i] * b[1][i] + a[2][i] * b[2][i];
@@ -172,7 +172,7 @@ pub fn dot8(a: &Axes8, b: &Axes8) -> [f64; LANES] {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ExactPacket {
     /// Scene units, relative to the plan's origin.
-    pub origin: Axes8,
+    pub origin: DVec3x8,
     /// Any length.
-    pub dir: Axes8,
+    pub dir: DVec3x8,
 }

@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Mul, Neg, Sub};
 
-use super::{Axes8, Float8, LANES, Mask8, float8};
+use super::{DVec3x8, Float8, LANES, Mask8, float8};
 
 /// Eight vectors, a lane each.
 #[derive(Debug, Clone, Copy)]
@@ -47,7 +47,7 @@ impl Vec3x8 {
 
     /// From f64.
     #[inline(always)]
-    pub fn rounded(axes: &Axes8) -> Self {
+    pub fn rounded(axes: &DVec3x8) -> Self {
         let axis = |k: usize| {
             let mut lanes = [0.0; LANES];
             for i in 0..LANES {

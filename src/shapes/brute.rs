@@ -67,7 +67,7 @@ impl Visit for ByBlock {
     }
 }
 
-/// The kernel's answers, doubts decided; what is said to be beyond reach is not met.
+/// The kernel's answers, doubts decided; asserts that what certainly misses is not met.
 fn decided<P: Part>(
     store: &Store<P>,
     rows: &P::Rows,
@@ -77,7 +77,7 @@ fn decided<P: Part>(
 ) -> [Option<f32>; LANES] {
     let part = |lane| store.part(row(lane));
     let anchor = P::anchor(rows, &rays.origin);
-    let beyond = P::beyond::<true>(rows, &anchor, rays).bits();
+    let misses = P::misses(rows, &anchor, rays).bits();
     let hidden = store.sides().lanes(&row);
     let Hit8 { t, mask, doubt, .. } = match cull {
         true => P::hit::<true, true>(rows, &anchor, rays, &hidden, part),
@@ -95,6 +95,6 @@ fn decided<P: Part>(
         part.decide(&Ray64::exact(&bits), visible).map(|t| kept.unwrap_or(t as f32))
     };
     let met: [Option<f32>; LANES] = std::array::from_fn(lane);
-    assert!((0..LANES).all(|lane| beyond >> lane & 1 == 0 || met[lane].is_none()), "{beyond:b}: {met:?} {rays:?}");
+    assert!((0..LANES).all(|lane| misses >> lane & 1 == 0 || met[lane].is_none()), "{misses:b}: {met:?} {rays:?}");
     met
 }

@@ -27,7 +27,7 @@ pub use self::store::{Hidden8, Store};
 pub use self::stores::{Groups, RowRef, Stores, Visit};
 
 use crate::lanes::{
-    Axes8, Columns, ExactPacket, Float8, Hit8, LANES, Mask8, Ray, RayPacket, UNIT_ROUNDOFF, Vec3x8, float8,
+    Columns, DVec3x8, ExactPacket, Float8, Hit8, LANES, Mask8, Ray, RayPacket, UNIT_ROUNDOFF, Vec3x8, float8,
 };
 use crate::plan::Owner;
 use crate::scene::Visible;
@@ -47,10 +47,10 @@ pub trait Part: Clone + Send + Sync {
     fn bounds8(rows: &Self::Rows) -> (Vec3x8, Vec3x8);
     /// What the kernel needs of these rows for rays from `origin`.
     fn anchor(rows: &Self::Rows, origin: &Vec3x8) -> Self::Anchor;
-    /// Lanes that are not met for certain, by as little of their rows as can tell: asked before one ray is held against eight
-    /// rows, most of whose memory it then need not touch.
+    /// Lanes that certainly miss, whatever was rounded, by as little of their rows as can tell: asked before one ray is held
+    /// against eight rows, most of whose memory it then need not touch.
     #[inline(always)]
-    fn beyond<const CERTIFY: bool>(_: &Self::Rows, _: &Self::Anchor, _: &RayPacket) -> Mask8 {
+    fn misses(_: &Self::Rows, _: &Self::Anchor, _: &RayPacket) -> Mask8 {
         Mask8::NONE
     }
     /// First hit with `t_min < t <= t_max`; with `CULL` hidden sides are not met. With `CERTIFY` it says what f32
@@ -70,8 +70,8 @@ pub trait Part: Clone + Send + Sync {
     /// The hit near `t` again, in f64; of two that f32 cannot tell apart the first one of a side that is seen.
     fn refine(&self, ray: &Ray64, t: f64, visible: Visible) -> Surface64;
     /// The same of up to eight parts, each met by the ray of its lane: the same bits. Lanes without a part mean nothing.
-    fn refine8(parts: &[Option<(&Self, Visible)>; LANES], rays: &ExactPacket, t: &[f32; LANES]) -> Exact8 {
-        let mut found = Exact8::default();
+    fn refine8(parts: &[Option<(&Self, Visible)>; LANES], rays: &ExactPacket, t: &[f32; LANES]) -> Surface64x8 {
+        let mut found = Surface64x8::default();
         for (lane, part) in parts.iter().enumerate() {
             let Some((part, visible)) = part else { continue };
             let (origin, dir) = rays.lane(lane);
@@ -151,17 +151,17 @@ pub struct Surface64 {
 
 /// Eight hit points to f64 accuracy.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Exact8 {
+pub struct Surface64x8 {
     /// On the surface.
-    pub point: Axes8,
+    pub point: DVec3x8,
     /// Geometric, outward, unit.
-    pub normal: Axes8,
+    pub normal: DVec3x8,
 }
 
-impl Exact8 {
+impl Surface64x8 {
     /// With some lanes from another.
     #[inline(always)]
-    fn set_lanes(&mut self, lanes: u32, other: &Exact8) {
+    fn set_lanes(&mut self, lanes: u32, other: &Surface64x8) {
         for k in 0..3 {
             for i in 0..LANES {
                 let taken = lanes >> i & 1 == 1;

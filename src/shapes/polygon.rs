@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::disk::round_bounds;
 use super::plane::{Crossing, flat_surface, flat_surface64, shows, side_hidden};
-use super::{Hidden8, Part, Ray64, Surface8, Surface64, VANISHED, roundings};
+use super::{Hidden8, Part, Ray64, Surface8, Surface64, VANISHED, VANISHING, roundings};
 use crate::lanes::{Float8, Hit8, Mask8, RayPacket, UNIT_ROUNDOFF, Vec3x8, float8};
 use crate::plan::{Owner, PolygonPart};
 use crate::scene::Visible;
@@ -92,14 +92,14 @@ impl<const N: usize> Part for PolygonPart<N> {
         Anchor { f, height: normal.dot(f), slip: roundings(31.0).mul_add(f.abs().sum(), *slip) }
     }
 
-    /// By the circle around the corners, which needs no edges.
+    /// By the circle around the corners, which needs no edges: beyond it by more than the bound of [`Part::hit`].
     #[inline(always)]
-    fn beyond<const CERTIFY: bool>(((rows, [radius, ..]), _): &Self::Rows, anchor: &Anchor, rays: &RayPacket) -> Mask8 {
+    fn misses(((rows, [radius, ..]), _): &Self::Rows, anchor: &Anchor, rays: &RayPacket) -> Mask8 {
         let dir = rays.dir.abs().sum();
-        let crossing = Crossing::within::<CERTIFY>(anchor.height, anchor.slip, rows[1].dot(rays.dir), dir);
+        let crossing = Crossing::within::<true>(anchor.height, anchor.slip, rows[1].dot(rays.dir), dir);
         let x = rays.dir.mul_add(crossing.t, -anchor.f);
-        let reach = crossing.error.mul_add(dir, *radius) * float8(BEYOND);
-        !crossing.on::<CERTIFY>(rays).0 | Mask8::gt(x.dot(x), reach * reach)
+        let reach = crossing.error.mul_add(dir, *radius + float8(VANISHING)) * float8(BEYOND);
+        !crossing.on::<true>(rays).0 | Mask8::gt(x.dot(x), reach * reach)
     }
 
     /// `t` comes from the plane, as in equation (6) of the paper; the point there, seen from the center so that

@@ -4,8 +4,10 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3};
 
-use super::{Exact8, Hidden8, Part, Ray64, Surface8, Surface64, VANISHED, nearer, roundings, unit};
-use crate::lanes::{Axes8, ExactPacket, Float8, Hit8, LANES, Mask8, RayPacket, Vec3x8, difference_of_products, float8};
+use super::{Hidden8, Part, Ray64, Surface8, Surface64, Surface64x8, VANISHED, nearer, roundings, unit};
+use crate::lanes::{
+    DVec3x8, ExactPacket, Float8, Hit8, LANES, Mask8, RayPacket, Vec3x8, difference_of_products, float8,
+};
 use crate::plan::{Owner, SpherePart};
 use crate::scene::Visible;
 
@@ -155,14 +157,15 @@ impl Part for SpherePart {
         Surface64 { t, point: self.center + normal * self.radius, normal }
     }
 
-    fn refine8(parts: &[Option<(&Self, Visible)>; LANES], rays: &ExactPacket, t: &[f32; LANES]) -> Exact8 {
-        let (mut center, mut radius, mut visible) = (Axes8::default(), [1.0; LANES], [Visible::Both; LANES]);
+    /// The formulas of `roots` and `refine`, operation by operation.
+    fn refine8(parts: &[Option<(&Self, Visible)>; LANES], rays: &ExactPacket, t: &[f32; LANES]) -> Surface64x8 {
+        let (mut center, mut radius, mut visible) = (DVec3x8::default(), [1.0; LANES], [Visible::Both; LANES]);
         for (lane, part) in parts.iter().enumerate() {
             let Some((part, side)) = part else { continue };
             (0..3).for_each(|k| center[k][lane] = part.center[k]);
             (radius[lane], visible[lane]) = (part.radius, *side);
         }
-        let mut found = Exact8::default();
+        let mut found = Surface64x8::default();
         for i in 0..LANES {
             let f: [f64; 3] = std::array::from_fn(|k| center[k][i] - rays.origin[k][i]);
             let d: [f64; 3] = std::array::from_fn(|k| rays.dir[k][i]);

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{Exact8, Part, Ray64, Store, Surface8, Surface64, noise};
+use super::{Part, Ray64, Store, Surface8, Surface64, Surface64x8, noise};
 use crate::lanes::{Columns, ExactPacket, Float8, LANES, Mask8, RayPacket, Vec3x8, bits, float8};
 use crate::plan::{
     BoxPart, ConePart, CylinderPart, DiskPart, Kind, Owner, Parts, PlanePart, PolygonPart, SPECK, SpherePart,
@@ -266,8 +266,8 @@ impl Stores {
     }
 
     /// What eight rays meet near `t` on the rows that they met, in f64; the other lanes mean nothing.
-    pub fn refine8(&self, lanes: u32, hits: &[f32; LANES], rays: &ExactPacket, t: &[f32; LANES]) -> Exact8 {
-        let (mut found, mut left) = (Exact8::default(), lanes);
+    pub fn refine8(&self, lanes: u32, hits: &[f32; LANES], rays: &ExactPacket, t: &[f32; LANES]) -> Surface64x8 {
+        let (mut found, mut left) = (Surface64x8::default(), lanes);
         while left != 0 {
             let first = RowRef::from_lane(hits[left.trailing_zeros() as usize % LANES]);
             let mut lanes = 0;
@@ -455,8 +455,8 @@ struct RefineEight<'a> {
 }
 
 impl Visit for RefineEight<'_> {
-    type Output = Exact8;
-    fn visit<P: Part>(self, store: &Store<P>) -> Exact8 {
+    type Output = Surface64x8;
+    fn visit<P: Part>(self, store: &Store<P>) -> Surface64x8 {
         let mut parts = [None; LANES];
         for lane in bits(self.lanes) {
             let row = RowRef::from_lane(self.hits[lane]).row();

@@ -23,9 +23,9 @@ use crate::tracer::{Found, Hit, Room, TILE, Tracer};
 
 /// Fewest repetitions.
 pub const LEAST_REPEATS: u32 = 5;
-/// A repetition traces at least so many rays, or passes for at least so many seconds.
+/// A repetition traces at least so many rays, unless passes for about so many seconds, by the first one, trace fewer.
 const LEAST_RAYS: usize = 1 << 20;
-const LEAST_SECONDS: f64 = 0.5;
+const ENOUGH_SECONDS: f64 = 0.5;
 /// Rays of each set that are traced one by one first.
 const PROVEN: usize = 1024;
 /// Tiles a task of rays that are made in place.
@@ -293,7 +293,7 @@ impl Bench<'_> {
     fn timed(&self, rays: usize, mut once: impl FnMut() -> Counts) -> (Counts, Times) {
         let start = Instant::now();
         let counts = once();
-        let in_time = (LEAST_SECONDS / start.elapsed().as_secs_f64()).ceil() as usize;
+        let in_time = (ENOUGH_SECONDS / start.elapsed().as_secs_f64()).ceil() as usize;
         let passes = LEAST_RAYS.div_ceil(rays.max(1)).min(in_time).max(1);
         let mut times = Times::default();
         for _ in 0..self.repeats {
